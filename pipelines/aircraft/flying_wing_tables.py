@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 from pipelines.aircraft.flying_wing_gusts import PRINTED_FLUTTER
 from pipelines.aircraft.flying_wing_results import AircraftExperiment, GustResult, GustRun
+from pipelines.aircraft.offset_scan import LEAST_STATIC_MARGIN
 from pipelines.report.numbers import interval, text
 from pipelines.report.tables import Table
 from sloshlab.aircraft.flutter_crossings import FlutterCrossing
@@ -15,6 +16,7 @@ from sloshlab.aircraft.oscillation_measures import OscillationMeasures
 
 PRINTED_FREQUENCY: Final = {1: {"frozen": 23.53, "lateral": 23.82}, 2: {"frozen": 22.7, "lateral": 23.12}}
 """Of the flutter of `PRINTED_FLUTTER`, rad/s."""
+Fate = Literal["diverges", "decays", "limit cycle"]
 OTHER_AIRCRAFT: Final = "another aircraft of the same shape: its mass, modes and places of tanks are not printed"
 
 
@@ -87,33 +89,38 @@ def _of_stability(experiment: AircraftExperiment, number: int) -> list[Compared]
 
 def _of_one_tank(experiment: AircraftExperiment) -> list[Compared]:
     before, after = _gust(experiment, "before"), _gust(experiment, "after")
-    rows = []
-    if before is not None and {"vertical", "full"} <= before.runs.keys():
-        damping = {model: run.first_mode.damping_ratio for model, run in before.runs.items()}
-        rows.append(
-            Compared(
-                f"damping of q₁, {before.gust.name}",
-                "vertical and full more than frozen; lateral none",
-                ", ".join(f"{model} {_share(value)}" for model, value in damping.items()),
-                "",
-                min(damping["vertical"], damping["full"]) > max(damping["frozen"], damping["lateral"]),
-            )
-        )
-        frequency = {model: run.first_mode.frequency_hz for model, run in before.runs.items()}
-        rows.append(
-            Compared(
-                f"frequency of q₁, {before.gust.name}",
-                "vertical and full lower, lateral slightly higher than frozen",
-                ", ".join(f"{model} {text(value, 4)}" for model, value in frequency.items()) + " Hz",
-                "the sign depends on how the liquid's mass fades and on the slope of the flutter's frequency",
-                frequency["vertical"] < frequency["frozen"] < frequency["lateral"],
-            )
-        )
+    rows = _vertical_sloshing(before, is_lower=True, why="")
     rows += _sideways(before)
     if after is not None:
-        rows.append(_fates(after, {"frozen": True, "lateral": True, "vertical": False, "full": False}))
+        expected: dict[str, Fate] = {"frozen": "diverges", "lateral": "diverges"}
+        rows.append(_fates(after, {**expected, "vertical": "limit cycle", "full": "limit cycle"}))
         rows += _larger(after)
     return rows
+
+
+def _vertical_sloshing(before: GustResult | None, *, is_lower: bool, why: str) -> list[Compared]:
+    """Damping and frequency that vertical sloshing adds before flutter, which the source finds lower or higher."""
+    if before is None or "vertical" not in before.runs:
+        return []
+    damping = {model: run.first_mode.damping_ratio for model, run in before.runs.items()}
+    frequency = {model: run.first_mode.frequency_hz for model, run in before.runs.items()}
+    shift = frequency["vertical"] - frequency["frozen"]
+    return [
+        Compared(
+            f"damping of q₁, {before.gust.name}",
+            "vertical and full more than frozen",
+            ", ".join(f"{model} {_share(value)}" for model, value in damping.items()),
+            why,
+            min(damping["vertical"], damping["full"]) > damping["frozen"],
+        ),
+        Compared(
+            f"frequency of q₁, {before.gust.name}",
+            f"vertical {'lower' if is_lower else 'higher'}, lateral slightly higher than frozen",
+            ", ".join(f"{model} {text(value, 4)}" for model, value in frequency.items()) + " Hz",
+            "the sign depends on how the liquid's mass fades and on the slope of the flutter's frequency",
+            (shift < 0) == is_lower and frequency["lateral"] > frequency["frozen"],
+        ),
+    ]
 
 
 def _of_two_tanks(experiment: AircraftExperiment) -> list[Compared]:
@@ -137,11 +144,13 @@ def _of_two_tanks(experiment: AircraftExperiment) -> list[Compared]:
             None,
         ),
     ]  # fmt: skip
-    expected = {
-        "before": {"frozen": False, "vertical": False, "full": False},
-        "between": {"frozen": True, "lateral": False, "vertical": False, "full": False},
-        "after": {"lateral": True, "vertical": False, "full": False},
+    expected: dict[str, dict[str, Fate]] = {
+        "before": {"frozen": "decays", "vertical": "decays", "full": "decays"},
+        "between": {"frozen": "diverges", "lateral": "decays", "vertical": "decays", "full": "decays"},
+        "after": {"lateral": "diverges", "vertical": "limit cycle", "full": "decays"},
     }
+    fading = "here the tanks' mass holds the flutter up, and a liquid that sloshes takes a share of it away"
+    rows += _vertical_sloshing(_gust(experiment, "before"), is_lower=False, why=fading)
     for label, fates in expected.items():
         result = _gust(experiment, label)
         if result is not None:
@@ -166,15 +175,21 @@ def _sideways(result: GustResult | None) -> list[Compared]:
     ]
 
 
-def _fates(result: GustResult, grows: dict[str, bool]) -> Compared:
-    known = {model: expected for model, expected in grows.items() if model in result.runs}
+def _fates(result: GustResult, expected: dict[str, Fate]) -> Compared:
+    known = {model: fate for model, fate in expected.items() if model in result.runs}
     return Compared(
         f"{result.gust.name} at {result.gust.speed_m_per_s:.2f} m/s",
-        ", ".join(f"{model} {'diverges' if expected else 'bounded'}" for model, expected in grows.items()),
+        ", ".join(f"{model} {fate}" for model, fate in expected.items()),
         ", ".join(f"{model} {fate_of(result.runs[model])}" for model in known),
-        "",
-        all(result.runs[model].has_diverged == expected for model, expected in known.items()),
+        "near 1 g the network decides: see the members of the ensemble" if "vertical" in known else "",
+        all(_ends_as(result.runs[model], fate) for model, fate in known.items()),
     )
+
+
+def _ends_as(run: GustRun, expected: Fate) -> bool:
+    if expected == "diverges":
+        return run.has_diverged
+    return not run.has_diverged and run.angle_of_attack.fate == expected
 
 
 def _larger(result: GustResult) -> list[Compared]:
@@ -195,15 +210,11 @@ def _larger(result: GustResult) -> list[Compared]:
 
 
 def _most_damped(result: GustResult, label: str) -> list[Compared]:
-    """Full sloshing leaves least of the oscillation in the last third."""
+    """Full sloshing damps more than vertical alone."""
     if not {"vertical", "full"} <= result.runs.keys():
         return []
     damping = {model: result.runs[model].first_mode.damping_ratio for model in ("vertical", "full")}
-    printed = {
-        "before": "full the most damped",
-        "between": "full more damped than vertical",
-        "after": "vertical in a limit cycle, full damped out",
-    }[label]
+    printed = {"before": "full the most damped"}.get(label, "full more damped than vertical")
     return [
         Compared(
             f"damping of q₁, {result.gust.name}",
@@ -291,12 +302,12 @@ def scan_sentence(experiment: AircraftExperiment) -> tuple[str, ...]:
     )
     chosen = experiment.scan.chosen()
     if chosen is None:
-        return (said, "it raises it nowhere beneath the wings where the rigid aircraft is stable")
+        return (said, f"it raises it nowhere with a static margin of {100 * LEAST_STATIC_MARGIN:g} % of the chord")
     place = experiment.scan.places[chosen[0]][chosen[1]]
     where = f"x = {place.x_m:.3f} m, y = ±{place.y_m:.3f} m"
     return (
         said,
-        f"most beneath the wings where the rigid aircraft is stable: {_percent(place.change)} at {where}",
+        f"most with a static margin of {100 * LEAST_STATIC_MARGIN:g} %: {_percent(place.change)} at {where}",
     )
 
 

@@ -30,6 +30,8 @@ FloatArray = npt.NDArray[np.float64]
 
 _PITCH, _HEAVE = 4, 2
 _MOST_PLACES: Final = 2000
+LEAST_STATIC_MARGIN: Final = 0.05
+"""Of a place that is chosen, a usual one: with less an aircraft pitches away on a slight force of its tanks."""
 _Offset = Annotated[float, Field(ge=-10, le=10, allow_inf_nan=False)]
 
 
@@ -134,15 +136,15 @@ class OffsetScan:
     places: list[list[PlaceOfTanks]]
 
     def chosen(self) -> tuple[int, int] | None:
-        """The place beneath the wings at which sideways sloshing raises the symmetric flutter most.
+        """The place at which sideways sloshing raises the symmetric flutter most.
 
-        Among those where the rigid aircraft is statically stable; None if sloshing raises it at none of them.
+        Among those with `LEAST_STATIC_MARGIN`; None if sloshing raises it at none of them.
         """
         best: tuple[float, tuple[int, int]] | None = None
         for row, places in enumerate(self.places):
             for column, place in enumerate(places):
                 is_better = place.change > (0.0 if best is None else best[0])
-                if is_better and place.static_margin > 0 and place.is_beneath:
+                if is_better and place.static_margin >= LEAST_STATIC_MARGIN:
                     best = (place.change, (row, column))
         return None if best is None else best[1]
 

@@ -43,6 +43,6 @@ def offset_map(name: str, *, experiment: AircraftExperiment) -> ReportFigure:
     caption = (
         "First symmetric flutter over the place of the right tank, the left one being its mirror image; nose up. "
         "Dots: beneath the wing; crosses: no flutter within the range; bars: statically unstable; star: where "
-        "sideways sloshing raises it most beneath the wings of a stable aircraft; ring: the tank of this file."
+        "sideways sloshing raises it most with a static margin of 5 % of the chord; ring: the tank of this file."
     )
     return ReportFigure(name, caption, "", png_bytes(figure))

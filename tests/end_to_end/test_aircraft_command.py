@@ -122,7 +122,7 @@ def test_without_a_trained_model_nothing_sloshes_vertically(
 ) -> None:
     """The gusts of the source at its distance from flutter, and the map of places."""
     scan = tmp_path / "scan.toml"
-    scan.write_text("left = [1020, 1050]\nright = [2020, 2050]\nx_offset_m = [-0.1]\n", encoding="utf-8")
+    scan.write_text("left = [1020, 1050]\nright = [2020, 2050]\nx_offset_m = [-0.3]\n", encoding="utf-8")
     out = tmp_path / "out"
     code = run(
         ["aircraft", str(model_of("case_2")), "--scan", str(scan), "--duration", "2", "--cache", str(cache),
