@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pipelines.aircraft import flying_wing_figures, flying_wing_tables, offset_scan_figure
+from pipelines.aircraft.flying_wing_comparison import comparisons, fate_of
 from pipelines.aircraft.flying_wing_results import AircraftExperiment, GustResult
 from pipelines.aircraft.gust_runs import recorded_case
 from pipelines.aircraft.response_file import response_dataset
@@ -66,7 +67,7 @@ def write_aircraft(
         "gusts": [_gust_summary(result) for result in experiment.gusts],
         "comparison": [
             {"fact": row.fact, "printed": row.printed, "reached": row.reached, "holds": row.holds}
-            for row in flying_wing_tables.comparisons(experiment)
+            for row in comparisons(experiment)
         ],
         "flags": list(experiment.flags),
         "lines": [*_sentences(experiment), *report_lines(folder, written=report)],
@@ -98,7 +99,7 @@ def _gust_summary(result: GustResult) -> dict[str, Any]:
                 "frequency_hz": known(run.first_mode.frequency_hz),
                 "damping_ratio": known(run.first_mode.damping_ratio),
                 "limit_cycle_rad": known(run.angle_of_attack.limit_cycle),
-                "fate": flying_wing_tables.fate_of(run),
+                "fate": fate_of(run),
                 "ending": run.recorded.response.ending,
                 "members_limit_cycle_rad": [known(member.limit_cycle) for member in result.members.get(model, ())],
                 "members_damping_ratio": [known(member.damping_ratio) for member in result.members.get(model, ())],
@@ -114,7 +115,7 @@ def _sentences(experiment: AircraftExperiment) -> tuple[str, ...]:
         lines.append("no --rom: liquids are frozen or slosh sideways only; nothing sloshes vertically")
     for result in experiment.gusts:
         if result.gust.is_main:
-            ends = ", ".join(f"{model} {flying_wing_tables.fate_of(run)}" for model, run in result.runs.items())
+            ends = ", ".join(f"{model} {fate_of(run)}" for model, run in result.runs.items())
             lines.append(f"gust {result.gust.name} at {result.gust.speed_m_per_s:.2f} m/s: {ends}")
     return (*lines, *flying_wing_tables.scan_sentence(experiment))
 
@@ -123,7 +124,7 @@ def _page(experiment: AircraftExperiment) -> Page:
     def plan(name: str, draw: Any, **more: Any) -> FigurePlan:
         return FigurePlan(name, partial(draw, experiment=experiment, **more))
 
-    compared = flying_wing_tables.comparisons(experiment)
+    compared = comparisons(experiment)
     sections = [
         SectionPlan(
             "Beside the source",
