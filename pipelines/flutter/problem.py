@@ -16,18 +16,12 @@ from pipelines.report.progress import progress
 from sloshlab.aeroelastic.bending_torsion_beam import WingModes
 from sloshlab.aeroelastic.cantilever_wing import CantileverWing
 from sloshlab.aeroelastic.generalised_force_cache import CacheStatus, cached_generalised_forces
-from sloshlab.aeroelastic.generalised_forces import (
-    GeneralisedForces,
-    generalised_forces,
-    usual_reduced_frequencies,
-)
+from sloshlab.aeroelastic.generalised_forces import GeneralisedForces, generalised_forces
 from sloshlab.aeroelastic.gust import gust_fit
 from sloshlab.aeroelastic.modal_structure import ModalStructure, of_modes
 from sloshlab.aeroelastic.p_k import Forces
 from sloshlab.aeroelastic.planform import Boxes
 from sloshlab.aeroelastic.rational_functions import RationalForces
-from sloshlab.aeroelastic.rational_minimum_state import minimum_state_fit
-from sloshlab.aeroelastic.rational_roger import roger_fit
 from sloshlab.aeroelastic.root_locus import System
 from sloshlab.aeroelastic.splines import BoxMotion
 from sloshlab.aeroelastic.state_space import system_over_speed
@@ -184,7 +178,7 @@ def _of_wing(model: WingModel, cache: Path | None) -> FlutterProblem:
     wing, chosen, density = model.wing, model.aerodynamics, model.flow.density_kg_per_m3
     modes = wing.modes(model.structure.n_modes, n_elements=model.structure.n_elements)
     structure = of_modes(modes.structure.natural_frequency_rad_per_s, damping_ratio=model.structure.damping_ratio)
-    k = usual_reduced_frequencies(chosen.largest_reduced_frequency, chosen.n_reduced_frequencies)
+    k = chosen.reduced_frequencies
     forces: Forces
     status: CacheStatus | None = None
     if chosen.method == "strips":
@@ -195,7 +189,7 @@ def _of_wing(model: WingModel, cache: Path | None) -> FlutterProblem:
         flow = (wing.semi_chord_m, model.flow.mach)
         lattice, status = _lattice(boxes, wing.motion(boxes, modes), k, flow, cache)
         forces, table = lattice.at, lattice.motion
-    rational = _fit(chosen, k, table, wing.semi_chord_m)
+    rational = chosen.fitted(table, wing.semi_chord_m)
     matrix_at = system_over_speed(structure, rational, density_kg_per_m3=density)
     return FlutterProblem(
         model.name,
@@ -214,13 +208,13 @@ def _of_wing(model: WingModel, cache: Path | None) -> FlutterProblem:
 def _of_aircraft(model: AircraftModel, liquids: Sequence[Liquids], cache: Path | None) -> FlutterProblem:
     chosen, density = model.aerodynamics, model.density_kg_per_m3
     surfaces = lifting_surfaces(model.structure, chosen.n_boxes)
-    k = usual_reduced_frequencies(chosen.largest_reduced_frequency, chosen.n_reduced_frequencies)
+    k = chosen.reduced_frequencies
     lattice, status = _lattice(surfaces.boxes, surfaces.motion, k, (surfaces.semi_chord_m, model.flow.mach), cache)
     if model.structure.is_free and chosen.rational == "roger":
         lags, b = np.array(chosen.lags), surfaces.semi_chord_m
         rational = air_of_free_flight(k, lattice.motion, semi_chord_m=b, lags=lags)
     else:
-        rational = _fit(chosen, k, lattice.motion, surfaces.semi_chord_m)
+        rational = chosen.fitted(lattice.motion, surfaces.semi_chord_m)
     variants = []
     for name in liquids:
         system = flight_system(model, rational, name, density_kg_per_m3=density)
@@ -270,7 +264,3 @@ def _lattice(
 def _named(advance: Callable[[str], None]) -> Callable[[float, float, str], None]:
     return lambda _done, _everything, note: advance(note)
 
-
-def _fit(chosen: RationalFit, k: FloatArray, table: ComplexArray, semi_chord_m: float) -> RationalForces:
-    fit = roger_fit if chosen.rational == "roger" else minimum_state_fit
-    return fit(k, table, semi_chord_m=semi_chord_m, lags=np.array(chosen.lags))

@@ -53,6 +53,33 @@ def beam_motion(boxes: Boxes, node_m: FloatArray, shape: FloatArray) -> BoxMotio
     return BoxMotion(displacement, slope, axis.at(load[:, 0], load @ across)[0])
 
 
+def mirrored_beam_motion(boxes: Boxes, node_m: FloatArray, shape: FloatArray) -> BoxMotion:
+    """Motion of the boxes of both halves of a wing that move alike; only the right half does work.
+
+    Parameters
+    ----------
+    boxes : Boxes
+        Of both halves, the plane y = 0 between them.
+    node_m : ndarray, shape (n_nodes, 3)
+        Of the half to starboard, from the root at y = 0.
+    shape : ndarray, shape (n_nodes, 6, n_modes)
+        As for `beam_motion`.
+
+    Returns
+    -------
+    BoxMotion
+        Forces by it are those on the half wing to starboard.
+    """
+    # the mirror turns y round, and with it rotations about x and z
+    mirrored = shape[:0:-1] * np.array([1, -1, 1, -1, 1, -1])[:, None]
+    nodes = np.vstack([node_m[:0:-1] * [1, -1, 1], node_m])
+    motion = beam_motion(boxes, nodes, np.vstack([mirrored, shape]))
+    right = boxes.at_chord(0.5)[:, 1] > 0
+    return BoxMotion(
+        motion.control_displacement, motion.control_slope, motion.load_displacement * right[:, None]
+    )
+
+
 class _Axis:
     """The axis of the beam over its coordinate across the flow."""
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from sloshlab.aeroelastic.arrays import FloatArray
-from sloshlab.aeroelastic.beam_spline import beam_motion
+from sloshlab.aeroelastic.beam_spline import mirrored_beam_motion
 from sloshlab.aeroelastic.bending_torsion_beam import WingBeam, WingModes, wing_modes
-from sloshlab.aeroelastic.planform import Boxes, Trapezoid, boxes_of
+from sloshlab.aeroelastic.planform import Boxes, mirrored_boxes
 from sloshlab.aeroelastic.section_forces import Section
 from sloshlab.aeroelastic.splines import BoxMotion
 from sloshlab.aeroelastic.strip import Strips, strips_of
@@ -178,15 +178,8 @@ class CantileverWing:
         -------
         Boxes
         """
-        surfaces = []
-        for number, (inner, outer) in enumerate(itertools.pairwise(self.stations)):
-            share = (outer.y_m - inner.y_m) / self.semi_span_m
-            for side, name in ((-1, "left"), (1, "right")):
-                edges = tuple((part.leading_edge_m, side * part.y_m, 0.0) for part in (inner, outer))
-                chords = (inner.chord_m, outer.chord_m)
-                n = max(1, round(n_span * share))
-                surfaces.append(Trapezoid(f"{name} {number + 1}", (edges[0], edges[1]), chords, n, n_chord))
-        return boxes_of(surfaces)
+        edges = [(station.y_m, station.leading_edge_m, station.chord_m) for station in self.stations]
+        return mirrored_boxes(edges, n_span, n_chord)
 
     def motion(self, boxes: Boxes, modes: WingModes) -> BoxMotion:
         """Motion of the boxes of both halves; only the right half does work on the half structure.
@@ -202,21 +195,10 @@ class CantileverWing:
         -------
         BoxMotion
         """
-        node, shape = self._nodes(modes)
-        motion = beam_motion(boxes, node, shape)
-        right = boxes.at_chord(0.5)[:, 1] > 0
-        return BoxMotion(
-            motion.control_displacement, motion.control_slope, motion.load_displacement * right[:, None]
-        )
-
-    def _nodes(self, modes: WingModes) -> tuple[FloatArray, FloatArray]:
-        """Nodes of both halves from the left tip on, with all six motions in each mode."""
         axis = self.axis_m(modes.node_m)
-        right = np.stack([axis, modes.node_m, np.zeros_like(axis)], axis=1)
         shape = np.zeros((axis.size, 6, modes.deflection.shape[1]))
         sweep = np.gradient(axis, modes.node_m, edge_order=1)[:, None]
         shape[:, 2], shape[:, 4] = modes.deflection, modes.twist_rad
         # the axis rises by dw/dy along itself: its own part, and that of the twist where it is swept
         shape[:, 3] = modes.slope + sweep * modes.twist_rad
-        mirrored = shape[:0:-1] * np.array([1, 1, 1, -1, 1, 1])[:, None]
-        return np.vstack([right[:0:-1] * [1, -1, 1], right]), np.vstack([mirrored, shape])
+        return mirrored_beam_motion(boxes, np.stack([axis, modes.node_m, np.zeros_like(axis)], axis=1), shape)

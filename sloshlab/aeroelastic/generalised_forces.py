@@ -76,6 +76,24 @@ class GeneralisedForces:
         k = min(float(reduced_frequency), self.largest_reduced_frequency)
         return np.asarray(self._motion_spline(k), dtype=complex)
 
+    def transferred(self, motion: FloatArray) -> GeneralisedForces:
+        """The same air on and by other coordinates.
+
+        Parameters
+        ----------
+        motion : ndarray, shape (n, n_new)
+            Old coordinates per new one.
+        """
+        return GeneralisedForces(
+            self.reduced_frequency,
+            motion.T @ self.motion @ motion,
+            motion.T @ self.gust,
+            self.travelling_gust @ motion,
+            self.zone_place_m,
+            self.semi_chord_m,
+            self.mach,
+        )
+
     @functools.cached_property
     def _motion_spline(self) -> Any:
         return CubicSpline(self.reduced_frequency, self.motion, axis=0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -177,6 +178,32 @@ def boxes_of(trapezoids: Sequence[Trapezoid]) -> Boxes:
     corners = [_corners(trapezoid) for trapezoid in trapezoids]
     surface = np.repeat(np.arange(len(corners)), [part.shape[0] for part in corners])
     return Boxes(np.concatenate(corners) if corners else np.empty((0, 4, 3)), surface, names)
+
+
+def mirrored_boxes(
+    edges_m: Sequence[tuple[float, float, float]], n_span: int, n_chord: int
+) -> Boxes:
+    """Boxes of a flat wing and its mirror image.
+
+    Parameters
+    ----------
+    edges_m : sequence of tuple
+        y, x of the leading edge, and chord, from the root at y = 0 to the tip; straight in between.
+    n_span, n_chord : int
+        Across one half, shared among the parts by their width, and along the flow.
+
+    Returns
+    -------
+    Boxes
+    """
+    surfaces, semi_span = [], edges_m[-1][0]
+    for number, (inner, outer) in enumerate(itertools.pairwise(edges_m)):
+        n = max(1, round(n_span * (outer[0] - inner[0]) / semi_span))
+        for side, name in ((-1, "left"), (1, "right")):
+            first, second = ((x, side * y, 0.0) for y, x, _ in (inner, outer))
+            chords = (inner[2], outer[2])
+            surfaces.append(Trapezoid(f"{name} {number + 1}", (first, second), chords, n, n_chord))
+    return boxes_of(surfaces)
 
 
 def _corners(trapezoid: Trapezoid) -> FloatArray:

@@ -13,6 +13,11 @@ import numpy.typing as npt
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from sloshlab import physical_ranges
+from sloshlab.aeroelastic.arrays import ComplexArray
+from sloshlab.aeroelastic.generalised_forces import usual_reduced_frequencies
+from sloshlab.aeroelastic.rational_functions import RationalForces
+from sloshlab.aeroelastic.rational_minimum_state import minimum_state_fit
+from sloshlab.aeroelastic.rational_roger import roger_fit
 from sloshlab.aircraft.deck_reader import read_deck
 from sloshlab.aircraft.structure import AircraftStructure, load_structure, structure_of_deck
 from sloshlab.errors import InputError
@@ -92,6 +97,16 @@ class RationalFit(_Described):
     n_reduced_frequencies: Annotated[int, Field(ge=6, le=100)] = 15
     rational: Literal["roger", "minimum_state"] = "roger"
     lags: tuple[_Positive, ...] = (0.08, 0.197, 0.487, 1.2)
+
+    @property
+    def reduced_frequencies(self) -> FloatArray:
+        """From 0, denser near it."""
+        return usual_reduced_frequencies(self.largest_reduced_frequency, self.n_reduced_frequencies)
+
+    def fitted(self, table: ComplexArray, semi_chord_m: float) -> RationalForces:
+        """Rational functions of a table over `reduced_frequencies`, shape (n_k, n, n)."""
+        fit = roger_fit if self.rational == "roger" else minimum_state_fit
+        return fit(self.reduced_frequencies, table, semi_chord_m=semi_chord_m, lags=np.array(self.lags))
 
 
 class AerodynamicsSection(RationalFit):
@@ -198,12 +213,15 @@ class AircraftTank:
 
 @dataclass(frozen=True, eq=False)
 class AircraftModel:
-    """Structure and tanks; coordinates are the body's six about its dry centre of mass, then the modes'."""
+    """Structure and tanks; coordinates are the body's six about its dry centre of mass, then the modes'.
+
+    `damping_ratio` is that of all modes, or of each.
+    """
 
     name: str
     structure: AircraftStructure
     tanks: tuple[AircraftTank, ...]
-    damping_ratio: float = 0.0
+    damping_ratio: float | FloatArray = 0.0
     flow: FlowSection = field(default_factory=FlowSection)
     aerodynamics: AerodynamicsSection = field(default_factory=AerodynamicsSection)
 

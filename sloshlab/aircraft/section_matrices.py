@@ -99,7 +99,7 @@ def mass_of_section(
         if not consistent:
             mass += np.diag([a * here] * 3 + [a * polar, 0.0, 0.0] + [b * here] * 3 + [b * polar, 0.0, 0.0])
             continue
-        shapes = _shapes(share, length)
+        shapes = beam_shapes(share, length)
         mass += shapes.T @ np.diag([here, here, here, polar]) @ shapes
     return mass
 
@@ -111,9 +111,17 @@ def _mass_samples(section: Section | TaperedSection) -> list[tuple[float, float,
     return [(0.5 * (1 + x), 0.5 * w, section) for x, w in zip(places, weights, strict=True)]
 
 
-def _shapes(share: float, length: float) -> FloatArray:
+def beam_shapes(share: float, length: float) -> FloatArray:
     """Stretch, deflections and twist there per motion of the ends (Archer), shape (4, 12).
 
+    Parameters
+    ----------
+    share : float
+        Of the length, from end A.
+    length : float
+
+    Notes
+    -----
     Stretch and twist are linear, deflections cubic; the rotation about y is −w′.
     """
     x = share
