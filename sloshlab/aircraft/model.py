@@ -31,6 +31,8 @@ _Positive = Annotated[_Number, Field(gt=0)]
 _Dimension = Annotated[_Number, AfterValidator(physical_ranges.TANK_DIMENSION_M.checked)]
 _Density = Annotated[_Number, AfterValidator(physical_ranges.LIQUID_DENSITY_KG_PER_M3.checked)]
 _MOST_TANKS: Final = 1000
+_UP: Final = 2
+"""Among the six directions of a tank."""
 _MODES_OF_A_DECK: Final = 20
 """With the six of a free body, unless the model says how many it keeps."""
 
@@ -178,6 +180,10 @@ class AircraftTank:
     turn_rad, sloshing_damping_ratio : float
     n_sloshing_modes : int
         Of each plane.
+    effective_mass_fraction : float
+        β of a vertical force −β m_l ü of the liquid beyond the frozen one; negative where it moves in counter-phase.
+    viscous_damping_n_s_per_m : float
+        c of a vertical force −c u̇ in place of sloshing (E.4).
     """
 
     name: str
@@ -187,12 +193,24 @@ class AircraftTank:
     turn_rad: float = 0.0
     n_sloshing_modes: int = 3
     sloshing_damping_ratio: float = 0.005
+    effective_mass_fraction: float = 0.0
+    viscous_damping_n_s_per_m: float = 0.0
 
     @property
     def frozen_mass(self) -> FloatArray:
-        """What its frozen liquid adds to the mass matrix, shape (n, n)."""
+        """What its frozen liquid adds to the mass matrix, with the effective mass if there is one, shape (n, n)."""
         at_centre = frozen_mass_matrix(self.box, turn_rad=self.turn_rad)
+        at_centre[_UP, _UP] += self._effective_mass_kg
         return np.asarray(self.motion.T @ at_centre @ self.motion)
+
+    @property
+    def damping(self) -> FloatArray:
+        """What its damper adds to the damping matrix, shape (n, n)."""
+        return self.viscous_damping_n_s_per_m * np.outer(self.motion[_UP], self.motion[_UP])
+
+    @property
+    def _effective_mass_kg(self) -> float:
+        return self.effective_mass_fraction * self.box.liquid_mass_kg
 
     @property
     def sloshing(self) -> TankCoupling:
@@ -203,7 +221,9 @@ class AircraftTank:
             damping_ratio=self.sloshing_damping_ratio,
             turn_rad=self.turn_rad,
         )
-        return at_centre.transferred(self.motion)
+        rigid = at_centre.rigid.copy()
+        rigid[_UP, _UP] -= self._effective_mass_kg
+        return replace(at_centre, rigid=rigid).transferred(self.motion)
 
     @property
     def liquid_place_m(self) -> FloatArray:
@@ -241,10 +261,19 @@ class AircraftModel:
 
     @property
     def damping_matrix(self) -> FloatArray:
-        """Of the modes, shape (n, n)."""
+        """Of the modes, and of dampers in tanks, shape (n, n).
+
+        Raises
+        ------
+        InputError
+            If a free aircraft has dampers in tanks: they would have to act in axes that do not fly with it.
+        """
         structure = self.structure
+        if structure.is_free and any(tank.viscous_damping_n_s_per_m for tank in self.tanks):
+            raise InputError("aircraft: dampers in tanks", got="a free aircraft", allowed="a clamped wing")
         modal = 4 * np.pi * self.damping_ratio * structure.frequencies_hz * structure.modal_masses_kg
-        return np.diag(np.concatenate([np.zeros(6 if structure.is_free else 0), modal]))
+        own = np.diag(np.concatenate([np.zeros(6 if structure.is_free else 0), modal]))
+        return np.asarray(sum((tank.damping for tank in self.tanks), own))
 
     @property
     def frozen_mass_matrix(self) -> FloatArray:
