@@ -97,6 +97,22 @@ class LinearFlight:
         ]
         return np.concatenate(planes)
 
+    def displacement_at(self, node: int) -> FloatArray:
+        """Vertical displacement of a node [m], up, per state; of a free aircraft by its place and attitude, too.
+
+        Parameters
+        ----------
+        node : int
+
+        Returns
+        -------
+        ndarray, shape (n_states,)
+        """
+        row = np.zeros(self.n_states)
+        moved = self.model.structure.motion_at(node)[_UP] @ self.to_structure
+        row[: moved.size] = moved
+        return row
+
     def velocity_at(self, node: int) -> FloatArray:
         """Absolute vertical velocity of a node [m/s], up, per state; its rate of change is the acceleration.
 

@@ -13,7 +13,6 @@ from math import sqrt
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
-from scipy.interpolate import RegularGridInterpolator
 
 from sloshlab.aeroelastic.arrays import ComplexArray
 from sloshlab.aeroelastic.energy import work_of_dampers, work_of_forces
@@ -24,6 +23,7 @@ from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.errors import InputError
 
 FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
 _UP = 2
 
 
@@ -180,7 +180,7 @@ def energy_map(
         forces = 0.5 * density * speed**2 * air.at(omega * air.semi_chord_m / speed)
         aero.append(per_square * work_of_forces(shape, forces))
         damping.append(per_square * work_of_dampers(shape, model.damping_matrix, omega))
-        slosh.append([liquid.of_motion(omega, float(amplitude) * shape) for amplitude in amplitude_m])
+        slosh.append(liquid.of_motion(omega, shape, amplitude_m))
     return EnergyMap(mode, amplitude_m, np.array(aero), np.array(damping), np.array(slosh))
 
 
@@ -197,44 +197,70 @@ class TankWork:
     def __init__(self, model: AircraftModel, w_bar: xr.DataArray) -> None:
         self.tanks = model.tanks
         grid = w_bar.transpose("omega_bar", "u_bar")
-        self._omega_bar, self._u_bar = grid["omega_bar"].values, grid["u_bar"].values
-        self._values = RegularGridInterpolator(
-            (self._omega_bar, self._u_bar), grid.values, bounds_error=False, fill_value=np.nan
-        )
+        self._omega_bar, self._u_bar, self._grid = grid["omega_bar"].values, grid["u_bar"].values, grid.values
 
-    def w_bar_of(self, omega_bar: float, u_bar: float) -> tuple[float, bool]:
-        """W̄, NaN where nothing was measured or the motion is stronger; and whether the motion is weaker, then W̄ of
-        the weakest measured one."""
-        value = float(self._values((omega_bar, u_bar)))
-        if np.isfinite(value):
-            return value, False
-        line = self._values(np.column_stack([np.full_like(self._u_bar, omega_bar), self._u_bar]))
+    def w_bar_of(self, omega_bar: float, u_bar: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """W̄ along the amplitude at one frequency.
+
+        Parameters
+        ----------
+        omega_bar : float
+        u_bar : ndarray, shape (n,)
+
+        Returns
+        -------
+        w_bar : ndarray, shape (n,)
+            Linear between grid lines; NaN where nothing was measured or the motion is stronger, and W̄ of the weakest
+            measured motion where it is weaker.
+        is_below : ndarray of bool, shape (n,)
+            Where it is weaker.
+        """
+        if not self._omega_bar[0] <= omega_bar <= self._omega_bar[-1]:
+            return np.full(u_bar.shape, np.nan), np.zeros(u_bar.shape, dtype=bool)
+        row = int(np.clip(np.searchsorted(self._omega_bar, omega_bar) - 1, 0, self._omega_bar.size - 2))
+        share = (omega_bar - self._omega_bar[row]) / (self._omega_bar[row + 1] - self._omega_bar[row])
+        line = (1 - share) * self._grid[row] + share * self._grid[row + 1]
         known = np.flatnonzero(np.isfinite(line))
-        if known.size and u_bar < self._u_bar[known[0]]:
-            return float(line[known[0]]), True
-        return float("nan"), False
+        if not known.size:
+            return np.full(u_bar.shape, np.nan), np.zeros(u_bar.shape, dtype=bool)
+        # gaps of the line stay gaps: NaN at a grid point makes both cells beside it unknown
+        values = np.interp(u_bar, self._u_bar, line, right=np.nan)
+        is_below = u_bar < self._u_bar[known[0]]
+        return np.where(is_below, line[known[0]], values), is_below
 
-    def of_tanks(self, omega_rad_per_s: float, coordinates: ComplexArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-        """Work on the structure by the liquid of each tank [J], ≤ 0, and whether it was below the measured motion.
+    def of_tanks(
+        self, omega_rad_per_s: float, shape: ComplexArray, amplitude_m: FloatArray
+    ) -> tuple[FloatArray, BoolArray]:
+        """Work on the structure by the liquid of each tank.
 
         Parameters
         ----------
         omega_rad_per_s : float
-        coordinates : ndarray of complex, shape (n,)
-            Amplitudes of the motion.
-        """
-        work, is_below = np.zeros(len(self.tanks)), np.zeros(len(self.tanks), dtype=bool)
-        for number, tank in enumerate(self.tanks):
-            amplitude = float(abs(tank.motion[_UP] @ coordinates))
-            height = tank.box.height_m
-            omega_bar = omega_rad_per_s / sqrt(GRAVITY_M_PER_S2 / height)
-            value, is_below[number] = self.w_bar_of(omega_bar, amplitude / height)
-            work[number] = -tank.box.liquid_mass_kg * (omega_rad_per_s * amplitude) ** 2 * value
-        return work, is_below
+        shape : ndarray of complex, shape (n,)
+        amplitude_m : ndarray, shape (n_amplitudes,)
+            Times the shape it is the motion.
 
-    def of_motion(self, omega_rad_per_s: float, coordinates: ComplexArray) -> float:
-        """Of all tanks [J]; NaN where the map does not tell it."""
-        work, is_below = self.of_tanks(omega_rad_per_s, coordinates)
-        if not np.isfinite(work).all() or is_below[int(np.argmin(work))]:
-            return float("nan")
-        return float(work.sum())
+        Returns
+        -------
+        work_j : ndarray, shape (n_tanks, n_amplitudes)
+            ≤ 0 where the liquid dissipates; NaN where the map does not tell it.
+        is_below : ndarray of bool, shape (n_tanks, n_amplitudes)
+            Where the motion was weaker than any that was measured.
+        """
+        work, below = [], []
+        for tank in self.tanks:
+            displacement = amplitude_m * abs(tank.motion[_UP] @ shape)
+            omega_bar = omega_rad_per_s / sqrt(GRAVITY_M_PER_S2 / tank.box.height_m)
+            value, is_below = self.w_bar_of(omega_bar, displacement / tank.box.height_m)
+            work.append(-tank.box.liquid_mass_kg * (omega_rad_per_s * displacement) ** 2 * value)
+            below.append(is_below)
+        return np.array(work), np.array(below)
+
+    def of_motion(self, omega_rad_per_s: float, shape: ComplexArray, amplitude_m: FloatArray) -> FloatArray:
+        """Of all tanks [J], shape (n_amplitudes,); NaN where the map does not tell it."""
+        work, is_below = self.of_tanks(omega_rad_per_s, shape, amplitude_m)
+        total = work.sum(axis=0)
+        # a sum that stands on a tank which moved less than was measured tells nothing
+        largest = np.argmin(np.where(np.isfinite(work), work, 0.0), axis=0)
+        total[is_below[largest, np.arange(total.size)]] = np.nan
+        return np.asarray(total)

@@ -1,0 +1,1 @@
+"""The wing with eight tanks: stability, gusts, limit cycles, energy maps, landing."""
