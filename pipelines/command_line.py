@@ -33,6 +33,9 @@ from pipelines.commands import flutter
 from pipelines.commands import aircraft
 
 # isort: split
+from pipelines.commands import wing
+
+# isort: split
 from pipelines.commands import case
 
 # isort: split
@@ -81,6 +84,7 @@ __all__ = [
     "recordings",
     "run",
     "trial",
+    "wing",
 ]
 
 # typer brings its own click or uses the installed one; either way this is the root of its usage errors

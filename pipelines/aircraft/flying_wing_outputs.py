@@ -48,7 +48,7 @@ def write_aircraft(
     provenance = provenance_of(command, experiment.inputs, settings=experiment.settings)
     name, stamp = experiment.model.name, stamp_of(provenance)
     datasets = {
-        "stability.nc": ("Stability over the speed", stability_dataset(experiment.flutter)),
+        "stability.nc": ("Stability over the speed", stability_dataset(experiment.flutter.results)),
         "response.nc": ("Gust responses", _responses(experiment)),
     }
     if experiment.scan is not None:

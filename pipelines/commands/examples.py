@@ -54,6 +54,10 @@ EXAMPLES: Final[dict[str, tuple[str, ...]]] = {
         "sloshlab simulate --rig rig.toml --input sweep_3g.nc -o simulated.nc",
         "sloshlab simulate --rig rig.toml --input sweep_3g.nc --block tank --save-twin twin.toml -o simulated.nc",
     ),
+    "wing": (
+        "sloshlab wing wing.toml --rom ROM.nc -o results",
+        "sloshlab wing wing.toml --rom ROM.nc --maps maps.nc --match-fold 323 -o results",
+    ),
     "flutter": (
         "sloshlab flutter wing.toml --from 60 --to 180 -o results",
         "sloshlab flutter aircraft.toml --models frozen,lateral --cache forces -o results",

@@ -16,6 +16,7 @@ from pipelines.flutter.problem import FlutterProblem, Variant, problem_of
 from pipelines.report.progress import progress
 from sloshlab.aeroelastic.generalised_force_cache import CacheStatus
 from sloshlab.aeroelastic.p_k import PkRoots, p_k_roots
+from sloshlab.aeroelastic.rational_functions import RationalForces
 from sloshlab.aeroelastic.root_locus import Crossing, RootLocus, root_locus
 from sloshlab.errors import InputError
 
@@ -189,19 +190,39 @@ def flutter_of(problem: FlutterProblem, settings: FlutterSettings, inputs: tuple
     """
     # matrices of a hundred rows: threads of BLAS only wait for one another
     with threadpool_limits(1), progress("root loci", 2 * len(problem.variants)) as advance:
-        results = tuple(_stability(problem, variant, settings, advance) for variant in problem.variants)
+        speeds = np.linspace(settings.first_m_per_s, settings.last_m_per_s, settings.n_speeds)
+        results = tuple(
+            stability_of(variant, problem.rational, problem.density_kg_per_m3, speeds, advance)
+            for variant in problem.variants
+        )
         checks = problem.checks(0.5 * (settings.first_m_per_s + settings.last_m_per_s))
     return FlutterExperiment(problem, settings, inputs, results, checks)
 
 
-def _stability(
-    problem: FlutterProblem, variant: Variant, settings: FlutterSettings, advance: Callable[[str], None]
+def stability_of(
+    variant: Variant,
+    rational: RationalForces,
+    density_kg_per_m3: float,
+    speeds: FloatArray,
+    advance: Callable[[str], None],
 ) -> Stability:
-    speeds = np.linspace(settings.first_m_per_s, settings.last_m_per_s, settings.n_speeds)
+    """Root locus and p-k of one variant.
+
+    Parameters
+    ----------
+    variant : Variant
+    rational : RationalForces
+        Of its coordinates.
+    density_kg_per_m3 : float
+        Of the air.
+    speeds : ndarray
+        Ascending.
+    advance : callable
+        Told both.
+    """
     locus = root_locus(variant.matrix_at, speeds, variant.structure.names, rigid=variant.rigid)
     advance(f"{variant.name}, rational functions")
-    rational = problem.rational
-    roots = _p_k(variant, rational.semi_chord_m, problem.density_kg_per_m3, speeds)
+    roots = _p_k(variant, rational.semi_chord_m, density_kg_per_m3, speeds)
     advance(f"{variant.name}, p-k")
     return Stability(variant, locus, roots, rational.semi_chord_m, rational.largest_reduced_frequency)
 

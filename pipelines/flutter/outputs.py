@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -63,7 +64,7 @@ def write_flutter(
     provenance = provenance_of(command, experiment.inputs, settings=experiment.settings)
     name = experiment.problem.name
     with result_folder(folder, provenance) as complete:
-        dataset = stability_dataset(experiment).assign_attrs(
+        dataset = stability_dataset(experiment.results).assign_attrs(
             title="Stability over the speed", name=name, **stamp_of(provenance)
         )
         write_dataset(dataset, complete / "stability.nc")
@@ -105,19 +106,19 @@ def _known(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def stability_dataset(experiment: FlutterExperiment) -> xr.Dataset:
-    """Put models side by side; one with fewer branches has NaN for the rest.
+def stability_dataset(results: Sequence[Stability]) -> xr.Dataset:
+    """Roots of models side by side; one with fewer branches has NaN for the rest.
 
     Parameters
     ----------
-    experiment : FlutterExperiment
+    results : sequence of Stability
+        At the same speeds.
 
     Returns
     -------
     xarray.Dataset
         As ``stability.nc`` keeps it.
     """
-    results = experiment.results
     loci = [result.locus for result in results]
     n_branches = max(len(locus.origin) for locus in loci)
     pole = np.full((len(loci), loci[0].speed_m_per_s.size, n_branches), np.nan, dtype=complex)

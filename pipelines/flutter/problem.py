@@ -263,4 +263,3 @@ def _lattice(
 
 def _named(advance: Callable[[str], None]) -> Callable[[float, float, str], None]:
     return lambda _done, _everything, note: advance(note)
-

@@ -20,15 +20,15 @@ from pipelines.wing.stability_stages import (
     energy_of,
     fill_curve,
     flutter_with_effective_mass,
+    frozen_stability,
     locus_speeds,
-    p_k_flutter_speed,
     with_smaller_tanks,
 )
 from sloshlab.aeroelastic.generalised_force_cache import CacheStatus
 from sloshlab.aeroelastic.generalised_forces import GeneralisedForces
 from sloshlab.aircraft.linear_sloshing import DAMPER_CHOICES, dampers_of_map
 from sloshlab.aircraft.wing_air import air_on_modes, air_on_nodes
-from sloshlab.aircraft.wing_calibration import WingState, calibrated, frozen_locus, wing_state
+from sloshlab.aircraft.wing_calibration import WingState, calibrated, wing_state
 from sloshlab.aircraft.wing_file import WingDescription, load_wing
 from sloshlab.errors import InputError
 from sloshlab.maps.map_readings import mean_along_acceleration
@@ -47,7 +47,9 @@ _SEARCHED_FROM_M_PER_S = 319.3
 class _Pipeline:
     """What all stages share."""
 
-    def __init__(self, path: Path, rom: Path, maps: Path | None, settings: WingSettings, cache: Path | None) -> None:
+    def __init__(
+        self, path: Path, rom: Path, maps: Path | None, settings: WingSettings, cache: Path | None
+    ) -> None:
         self.described = load_wing(path)
         self.settings, self.rom, self.cache = settings, rom, cache
         targets = self.described.calibration
@@ -85,8 +87,7 @@ class _Pipeline:
         """Everything of one wing."""
         settings, described = self.settings, state.described
         tanks = load_tank_models(state.model, self.rom)
-        locus = frozen_locus(state.model, state.air, locus_speeds(settings))
-        advance("root locus")
+        stability = frozen_stability(state, locus_speeds(settings), advance)
         beta = () if self.maps is None else (mean_along_acceleration(self.maps["beta"], 0.25),)
         fractions = tuple(value for value in (BETA_HAT, -BETA_HAT, *beta) if np.isfinite(value))
         effective = flutter_with_effective_mass(state, fractions)
@@ -106,9 +107,8 @@ class _Pipeline:
             landing = landing_case(state, air, described.landing, tanks, settings, advance)
         return WingResult(
             state=state,
-            locus=locus,
+            stability=stability,
             effective_mass=effective,
-            p_k_flutter_m_per_s=p_k_flutter_speed(state),
             fills=fill_curve(described, state.air, advance),
             gusts=gusts,
             bifurcation=bifurcation(state, tanks, settings, speeds, advance),
@@ -183,7 +183,7 @@ def analyse_wing(
         # refused before hours of work, not after them
         load_tank_models(state.model, rom)
         speeds = settings.bifurcation_speeds_m_per_s
-        n_steps = 1 + len(GUSTS) + len(DAMPER_CHOICES) + 2 + len(FILL_LEVELS) + 3 * speeds.size
+        n_steps = 2 + len(GUSTS) + len(DAMPER_CHOICES) + 2 + len(FILL_LEVELS) + 3 * speeds.size
         with progress("wing", n_steps) as advance:
             wing = pipeline.result(state, speeds, landing_air, advance)
         matched, share = None, float("nan")
@@ -200,4 +200,3 @@ def analyse_wing(
 def _speeds_near(fold_m_per_s: float, settings: WingSettings) -> np.ndarray:
     """From the lowest speed to a bit beyond the fold."""
     return np.linspace(settings.first_m_per_s, fold_m_per_s + 2.0, settings.n_bifurcation)
-

@@ -81,9 +81,7 @@ def gust_case(
     def flown(name: str, amplitude: float, duration_s: float = settings.duration_s) -> RecordedResponse:
         forces = tanks.forces() if name == SLOSHING else {}
         shape = gust_of(state, settings, speed, amplitude)
-        response = simulate_flight(
-            flight, forces, duration_s=duration_s, output_step_s=OUTPUT_STEP_S, gust=shape
-        )
+        response = simulate_flight(flight, forces, duration_s=duration_s, output_step_s=OUTPUT_STEP_S, gust=shape)
         return RecordedResponse(name, response, tuple(tanks.departures(response)) if forces else ())
 
     # frozen liquids are linear: their largest acceleration tells the largest gust, the trained models then decide
@@ -146,9 +144,7 @@ def damper_case(
     runs = list(trained.case.runs)
     for name, damping in dampers.items():
         flight = flight_at(with_dampers(state.model, damping), state.air, speed)
-        response = simulate_flight(
-            flight, duration_s=settings.duration_s, output_step_s=OUTPUT_STEP_S, gust=shape
-        )
+        response = simulate_flight(flight, duration_s=settings.duration_s, output_step_s=OUTPUT_STEP_S, gust=shape)
         runs.append(RecordedResponse(name, response))
         advance(f"damper {name}")
     case = RecordedCase(f"dampers, {trained.case.name}", speed, amplitude, trained.case.length_m, tuple(runs))

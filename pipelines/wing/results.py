@@ -12,8 +12,9 @@ import numpy.typing as npt
 import xarray as xr
 
 from pipelines.aircraft.response_file import RecordedCase, RecordedResponse
+from pipelines.flutter.analysis import Stability
 from sloshlab.aeroelastic.generalised_force_cache import CacheStatus
-from sloshlab.aeroelastic.root_locus import Crossing, RootLocus
+from sloshlab.aeroelastic.root_locus import Crossing
 from sloshlab.aircraft.limit_cycle import BranchPoint
 from sloshlab.aircraft.response_readings import LimitCycle, PeakDamping
 from sloshlab.aircraft.vertical_sloshing import TankDeparture
@@ -79,11 +80,14 @@ class WingSettings:
                 allowed=f"{LOWEST_SPEED_M_PER_S:g} ≤ from < to ≤ {HIGHEST_SPEED_M_PER_S:g}",
             )
         if not 2 <= self.n_bifurcation <= 1000:
-            raise InputError("--bifurcation", got=f"{self.n_bifurcation}", allowed="2 … 1000")
-        if not 5 <= self.n_speeds <= 10_000:
-            raise InputError("--speeds", got=f"{self.n_speeds}", allowed="5 … 10000")
-        if self.match_fold_m_per_s is not None and not self.first_m_per_s < self.match_fold_m_per_s < HIGHEST_SPEED_M_PER_S:
-            raise InputError("--match-fold", got=f"{self.match_fold_m_per_s:g}", allowed="a speed beyond flutter")
+            raise InputError("--speeds", got=f"{self.n_bifurcation}", allowed="2 … 1000")
+        if not (self.gust_length_m is None or 0 < self.gust_length_m <= 1e5):
+            raise InputError("--gust-length", got=f"{self.gust_length_m:g}", allowed="> 0 m")
+        if not 10 <= self.longest_s <= 10_000:
+            raise InputError("--patience", got=f"{self.longest_s:g} s", allowed="10 … 10000 s")
+        fold = self.match_fold_m_per_s
+        if fold is not None and not self.first_m_per_s < fold < HIGHEST_SPEED_M_PER_S:
+            raise InputError("--match-fold", got=f"{fold:g}", allowed="a speed beyond flutter")
 
     @property
     def bifurcation_speeds_m_per_s(self) -> FloatArray:
@@ -198,12 +202,10 @@ class WingResult:
     Attributes
     ----------
     state : WingState
-    locus : RootLocus
+    stability : Stability
         With frozen liquids.
     effective_mass : mapping of float to Crossing or None
         Flutter with an effective mass in all tanks, by its fraction.
-    p_k_flutter_m_per_s : float
-        NaN if p-k finds none.
     fills : FillCurve
     gusts : tuple of GustCase
     bifurcation : Bifurcation
@@ -217,9 +219,8 @@ class WingResult:
     """
 
     state: WingState
-    locus: RootLocus
+    stability: Stability
     effective_mass: Mapping[float, Crossing | None]
-    p_k_flutter_m_per_s: float
     fills: FillCurve
     gusts: tuple[GustCase, ...]
     bifurcation: Bifurcation
@@ -247,7 +248,7 @@ class WingResult:
         """What must be read before the results; that tanks move less than any training is told in a table."""
         targets = self.state.described.calibration
         found = [] if targets is None else self.state.misses(targets)
-        found += list(self.locus.flags)
+        found += list(self.stability.flags)
         found += [f"{name}: {one}" for name, one in self.departures if one.kind != "too weak"]
         found += [
             f"{case.case.name}, {run.model}: {run.response.ending}"

@@ -10,6 +10,8 @@ import numpy.typing as npt
 import xarray as xr
 
 from pipelines.aircraft.tank_models import TankModels
+from pipelines.flutter.analysis import Stability, stability_of
+from pipelines.flutter.problem import Variant
 from pipelines.wing.gust_stages import OUTPUT_STEP_S, flight_at, gust_of, tip_node
 from pipelines.wing.results import (
     HIGHEST_SPEED_M_PER_S,
@@ -20,7 +22,6 @@ from pipelines.wing.results import (
     FillCurve,
     WingSettings,
 )
-from sloshlab.aeroelastic.p_k import p_k_flutter
 from sloshlab.aeroelastic.root_locus import Crossing
 from sloshlab.aircraft.beam_wing import wing_model
 from sloshlab.aircraft.flight_stability import flight_system
@@ -32,7 +33,6 @@ from sloshlab.aircraft.wing_air import WingAir
 from sloshlab.aircraft.wing_calibration import WingState, frozen_locus
 from sloshlab.aircraft.wing_energy import EnergyMap, critical_mode, energy_map
 from sloshlab.aircraft.wing_file import WingDescription
-from sloshlab.errors import AnalysisError
 from sloshlab.maps.map_readings import mean_along_acceleration
 
 FloatArray = npt.NDArray[np.float64]
@@ -50,24 +50,12 @@ def locus_speeds(settings: WingSettings) -> FloatArray:
     return np.linspace(LOWEST_SPEED_M_PER_S, HIGHEST_SPEED_M_PER_S, settings.n_speeds)
 
 
-def p_k_flutter_speed(state: WingState) -> float:
-    """First flutter by p-k from the table itself; NaN without one."""
-    system = flight_system(
-        state.model, state.air.motion, "frozen", density_kg_per_m3=state.model.density_kg_per_m3
-    )
-    # modes are followed from low speeds on, where each has the frequency that it has without flow
-    speeds = np.concatenate([
-        np.geomspace(10.0, LOWEST_SPEED_M_PER_S, 14)[:-1],
-        np.linspace(LOWEST_SPEED_M_PER_S, HIGHEST_SPEED_M_PER_S, 23),
-    ])  # fmt: skip
-    try:
-        speed, _, _ = p_k_flutter(
-            system.structure, state.air.table.at, semi_chord_m=state.air.table.semi_chord_m,
-            density_kg_per_m3=state.model.density_kg_per_m3, speeds=speeds,
-        )  # fmt: skip
-    except AnalysisError:
-        return float("nan")
-    return speed
+def frozen_stability(state: WingState, speeds: FloatArray, advance: Advance) -> Stability:
+    """Root locus and p-k with frozen liquids."""
+    density = state.model.density_kg_per_m3
+    system = flight_system(state.model, state.air.motion, "frozen", density_kg_per_m3=density)
+    variant = Variant("frozen", system.structure, state.air.table.at, system.matrix_at)
+    return stability_of(variant, state.air.motion, density, speeds, advance)
 
 
 def flutter_with_effective_mass(state: WingState, fractions: Sequence[float]) -> Mapping[float, Crossing | None]:
@@ -187,7 +175,7 @@ def bifurcation(
 
 
 def with_smaller_tanks(described: WingDescription, share: float) -> WingDescription:
-    """The wing with tanks of less base area: less liquid, at the same ω̄ and v̄, which the height decides.
+    """The wing with smaller tanks of the same shape.
 
     Parameters
     ----------
@@ -195,10 +183,9 @@ def with_smaller_tanks(described: WingDescription, share: float) -> WingDescript
     share : float
         Of the volume, > 0.
     """
-    side = share**0.5
+    side = share ** (1 / 3)
+    sides = ("length_m", "width_m", "height_m")
     tanks = tuple(
-        tank.model_copy(update={"length_m": tank.length_m * side, "width_m": tank.width_m * side})
-        for tank in described.tanks
+        tank.model_copy(update={name: getattr(tank, name) * side for name in sides}) for tank in described.tanks
     )
     return described.model_copy(update={"tanks": tanks})
-

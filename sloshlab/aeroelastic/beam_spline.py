@@ -75,9 +75,7 @@ def mirrored_beam_motion(boxes: Boxes, node_m: FloatArray, shape: FloatArray) ->
     nodes = np.vstack([node_m[:0:-1] * [1, -1, 1], node_m])
     motion = beam_motion(boxes, nodes, np.vstack([mirrored, shape]))
     right = boxes.at_chord(0.5)[:, 1] > 0
-    return BoxMotion(
-        motion.control_displacement, motion.control_slope, motion.load_displacement * right[:, None]
-    )
+    return BoxMotion(motion.control_displacement, motion.control_slope, motion.load_displacement * right[:, None])
 
 
 class _Axis:

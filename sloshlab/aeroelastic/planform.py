@@ -180,9 +180,7 @@ def boxes_of(trapezoids: Sequence[Trapezoid]) -> Boxes:
     return Boxes(np.concatenate(corners) if corners else np.empty((0, 4, 3)), surface, names)
 
 
-def mirrored_boxes(
-    edges_m: Sequence[tuple[float, float, float]], n_span: int, n_chord: int
-) -> Boxes:
+def mirrored_boxes(edges_m: Sequence[tuple[float, float, float]], n_span: int, n_chord: int) -> Boxes:
     """Boxes of a flat wing and its mirror image.
 
     Parameters

@@ -130,9 +130,7 @@ def landing_flight(
     matrix, of_wind = np.zeros((n + 2, n + 2)), np.zeros((n + 2, 2))
     matrix[:n, :n] = own.matrix
     matrix[n + 1, n], matrix[n + 1, n + 1] = SLOW_RAD_PER_S, -SLOW_RAD_PER_S
-    of_wind[own.rates, 1] = np.linalg.solve(
-        total_mass(system.structure, air, landing.density_kg_per_m3), forces
-    )
+    of_wind[own.rates, 1] = np.linalg.solve(total_mass(system.structure, air, landing.density_kg_per_m3), forces)
     of_wind[n, 1] = 1.0
     n_tanks = len(model.tanks)
     of_fuselage = np.tile([1.0, -1.0], (n_tanks, 1))

@@ -15,6 +15,7 @@ from sloshlab.aircraft.tank_simulation import FlightResponse, VerticalForce, sim
 
 FloatArray = npt.NDArray[np.float64]
 
+
 @dataclass(frozen=True, eq=False)
 class BranchPoint:
     """The motion that a wing ended on at one speed.

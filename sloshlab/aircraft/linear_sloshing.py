@@ -31,9 +31,7 @@ def with_effective_mass(model: AircraftModel, fraction: float) -> AircraftModel:
         β̂; negative where the liquid moves in counter-phase, so that the effective mass is (1 + β̂) m_l. The source
         prints (3.14) with the other sign, which would make the mass grow.
     """
-    return replace(
-        model, tanks=tuple(replace(tank, effective_mass_fraction=fraction) for tank in model.tanks)
-    )
+    return replace(model, tanks=tuple(replace(tank, effective_mass_fraction=fraction) for tank in model.tanks))
 
 
 def with_dampers(model: AircraftModel, damping_n_s_per_m: Mapping[str, float]) -> AircraftModel:
