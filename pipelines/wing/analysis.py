@@ -93,7 +93,7 @@ class _Pipeline:
         effective = flutter_with_effective_mass(state, fractions)
         gusts = tuple(gust_case(state, tanks, settings, gust, advance) for gust in GUSTS)
         dampers = None
-        damping = {}
+        damping: dict[str, dict[str, float]] = {}
         if self.maps is not None and state.flutter is not None:
             omega = state.flutter.frequency_rad_per_s
             damping = {
@@ -144,7 +144,7 @@ class _Pipeline:
 def _balance_at(
     state: WingState, w_bar: xr.DataArray, beta: float, speed_m_per_s: float, settings: WingSettings
 ) -> float:
-    """Work of air and structure over the most that the liquid can take, at a speed, in the mode with effective mass."""
+    """Work of air and structure over the most that the liquid can take, in the mode with effective mass."""
     works = energy_of(state, w_bar, beta if np.isfinite(beta) else 0.0, settings)
     row = int(np.argmin(np.abs(works.mode.speed_m_per_s - speed_m_per_s)))
     square = works.amplitude_m**2

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -76,7 +75,8 @@ def layout(name: str, *, result: WingResult) -> ReportFigure:
     axes.set_ylabel("x, aft [m]")
     figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=3)
     caption = (
-        "The wing from above, nose up: boxes of the doublet lattice (its mirror image moves alike), the beam along "
+        "The wing from above, nose up: boxes of the doublet lattice (its mirror image moves alike), "
+        "the beam along "
         "the swept elastic axis, and the tanks."
     )
     return ReportFigure(name, caption, "Fig. 3.1", png_bytes(figure))
@@ -122,7 +122,8 @@ def fill_level(name: str, *, result: WingResult) -> ReportFigure:
     axes.set_ylabel("flutter speed U_F [m/s]")
     figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=2)
     caption = (
-        "Flutter speed over the fill level with frozen liquids, and at the fill level of the file with an effective "
+        "Flutter speed over the fill level with frozen liquids, and at the fill level of the file "
+        "with an effective "
         "mass (1 + β̂) m_l that moves up and down. The sign of (3.14) as printed makes the mass grow."
     )
     return ReportFigure(name, caption, "Fig. 3.6", png_bytes(figure))
@@ -164,7 +165,8 @@ def gust(name: str, *, case: GustCase, counterpart: str) -> ReportFigure:
     )
     what = f"{speed:g} m/s, gust of {w:.3g} m/s" if np.isfinite(w) else "Landing"
     caption = (
-        f"{what}: above the vertical acceleration of the tip with frozen and with sloshing liquids, below the force "
+        f"{what}: above the vertical acceleration of the tip with frozen and with sloshing liquids, "
+        f"below the force "
         f"of each liquid beyond the frozen one.{less if np.isfinite(w) else ''}"
     )
     return ReportFigure(name, caption, counterpart, png_bytes(figure))
@@ -190,7 +192,8 @@ def two_gusts(name: str, *, cases: tuple[GustCase, ...]) -> ReportFigure:
         reading = case.readings[SLOSHING]
         axes.plot(
             reading.record.response.time_s, 1e3 * reading.displacement_m, color=DISTINCT_COLOURS[number],
-            linewidth=0.8, label=f"w = {case.case.amplitude_m_per_s:.3g} m/s, ends at {1e3 * reading.end.amplitude:.2f} mm",
+            linewidth=0.8,
+            label=f"w = {case.case.amplitude_m_per_s:.3g} m/s, ends at {1e3 * reading.end.amplitude:.2f} mm",
         )  # fmt: skip
     axes.set_xlabel("time [s]")
     axes.set_ylabel("displacement of the tip [mm]")
@@ -216,7 +219,7 @@ def bifurcation(name: str, *, found: Bifurcation, balance: EnergyBalance | None)
         )
     ):
         kept = [point for point in points if not point.ending]
-        style = {"color": DISTINCT_COLOURS[number], "markersize": 5.5 - number}
+        style: dict[str, Any] = {"color": DISTINCT_COLOURS[number], "markersize": 5.5 - number}
         axes.plot(
             [p.speed_m_per_s for p in kept], [1e3 * p.cycle.amplitude if p.is_alive else 0.0 for p in kept],
             DISTINCT_MARKERS[number], mfc="none", label=label, **style,
@@ -233,7 +236,8 @@ def bifurcation(name: str, *, found: Bifurcation, balance: EnergyBalance | None)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=2)
     caption = (
         "Limit cycles: amplitude of the tip that simulations end with, after a gust of 0.15 m/s from rest and "
-        "continued from the motion at the speed before; at 0 the motion has died, crosses: it diverges. Lines: where "
+        "continued from the motion at the speed before; at 0 the motion has died, crosses: it "
+        "diverges. Lines: where "
         "the works of air, structure and liquid add up to zero in the energy map. Dotted: flutter with frozen "
         "liquids (black), and the end of the source's limit cycle (red)."
     )
@@ -291,8 +295,10 @@ def energy(name: str, *, balance: EnergyBalance, found: Bifurcation) -> ReportFi
     panels[0].set_ylim(0.0, top)
     panels[0].set_ylabel("amplitude of the tip [mm]")
     caption = (
-        "Work on the structure in a cycle of the critical mode, orange where it feeds the vibration: of the air, of "
-        "the liquid in all tanks from the map of W̄, and of both with the structure's dampers. Lines: sum zero, in "
+        "Work on the structure in a cycle of the critical mode, orange where it feeds the "
+        "vibration: of the air, of "
+        "the liquid in all tanks from the map of W̄, and of both with the structure's dampers. "
+        "Lines: sum zero, in "
         "the mode with frozen liquids and in that with effective mass; circles: simulated limit cycles. Grey: "
         "outside the measured map."
     )
@@ -349,7 +355,8 @@ def damper_damping(name: str, *, case: GustCase) -> ReportFigure:
     axes.set_ylabel("damping ratio ζ [%]")
     figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=5)
     caption = (
-        "Damping of the tip's displacement from a peak to the third one (logarithmic decrement) in the same gust, as "
+        "Damping of the tip's displacement from a peak to the third one (logarithmic decrement) in "
+        "the same gust, as "
         "long as the motion is above a hundredth of its first."
     )
     return ReportFigure(name, caption, "Fig. E.9", png_bytes(figure))
@@ -388,7 +395,8 @@ def damping_maps(name: str, *, result: WingResult, w_bar: xr.DataArray) -> Repor
     panels[0].set_ylabel("ū = u₀/h")
     figure.colorbar(colours, ax=list(panels), label="c [kN s/m]")
     caption = (
-        "Damping coefficient of two tanks, c = m_l/π √(g/h) ω̄ W̄(ω̄, ū) (E.7), from the measured map: the larger tank "
+        "Damping coefficient of two tanks, c = m_l/π √(g/h) ω̄ W̄(ω̄, ū) (E.7), from the measured "
+        "map: the larger tank "
         "dissipates more than the one near the tip."
     )
     return ReportFigure(name, caption, "Fig. E.7", png_bytes(figure))

@@ -136,7 +136,8 @@ def _cycles(name: str, result: WingResult) -> str:
     fold = result.bifurcation.fold_m_per_s
     ending = f"; beyond {fold:.2f} m/s the motion diverges" if fold == fold else "; it does not end there"
     return (
-        f"{name}: limit cycles from {first.speed_m_per_s:.2f} m/s ({1e3 * first.cycle.amplitude:.3g} mm at the tip) to "
+        f"{name}: limit cycles from {first.speed_m_per_s:.2f} m/s "
+        f"({1e3 * first.cycle.amplitude:.3g} mm at the tip) to "
         f"{last.speed_m_per_s:.2f} m/s ({1e3 * last.cycle.amplitude:.3g} mm){ending}"
     )
 

@@ -156,7 +156,7 @@ class Bifurcation:
 
     @property
     def fold_m_per_s(self) -> float:
-        """Middle between the last speed with a limit cycle and the first where the motion diverges; NaN if none."""
+        """Middle between the last speed with a limit cycle and the first where motion diverges; NaN if none."""
         lost = [point.speed_m_per_s for point in self.up if point.ending]
         kept = [point.speed_m_per_s for point in self.up if not point.ending]
         return 0.5 * (min(lost) + max(kept)) if lost and kept else float("nan")

@@ -22,7 +22,7 @@ from pipelines.wing.results import (
     FillCurve,
     WingSettings,
 )
-from sloshlab.aeroelastic.root_locus import Crossing
+from sloshlab.aeroelastic.root_locus import Crossing, first_flutter
 from sloshlab.aircraft.beam_wing import wing_model
 from sloshlab.aircraft.flight_stability import flight_system
 from sloshlab.aircraft.limit_cycle import BranchPoint, Settling, followed, settle
@@ -43,6 +43,9 @@ _LOW_LEVEL_G = 0.25
 _LARGEST_AMPLITUDE_M = 0.3
 _N_AMPLITUDES = 300
 _ENERGY_STEP_M_PER_S = 0.25
+_SEARCHED_M_PER_S = (150.0, 450.0)
+_N_SEARCHED = 31
+"""Where flutter is looked for at other fill levels and with effective masses."""
 
 
 def locus_speeds(settings: WingSettings) -> FloatArray:
@@ -60,11 +63,14 @@ def frozen_stability(state: WingState, speeds: FloatArray, advance: Advance) -> 
 
 def flutter_with_effective_mass(state: WingState, fractions: Sequence[float]) -> Mapping[float, Crossing | None]:
     """First flutter with β̂ in all tanks, for each β̂."""
-    speeds = np.linspace(LOWEST_SPEED_M_PER_S, HIGHEST_SPEED_M_PER_S, 12)
     return {
-        fraction: frozen_locus(with_effective_mass(state.model, fraction), state.air, speeds).flutter
-        for fraction in fractions
+        fraction: _first_flutter(with_effective_mass(state.model, fraction), state.air) for fraction in fractions
     }
+
+
+def _first_flutter(model: AircraftModel, air: WingAir) -> Crossing | None:
+    system = flight_system(model, air.motion, "frozen", density_kg_per_m3=model.density_kg_per_m3)
+    return first_flutter(system.matrix_at, np.linspace(*_SEARCHED_M_PER_S, _N_SEARCHED))
 
 
 def fill_curve(described: WingDescription, air: WingAir, advance: Advance) -> FillCurve:
@@ -77,14 +83,13 @@ def fill_curve(described: WingDescription, air: WingAir, advance: Advance) -> Fi
         On the modes, which the liquid does not change.
     advance : callable
     """
-    speeds = np.linspace(LOWEST_SPEED_M_PER_S, HIGHEST_SPEED_M_PER_S, 12)
     found = []
     for level in FILL_LEVELS:
         # an empty tank is none; the equations need a free surface, so the fullest is nearly full
         filled = tuple(tank.model_copy(update={"fill_level": level}) for tank in described.tanks) if level else ()
         damped = wing_model(described.model_copy(update={"tanks": filled or described.tanks}))
         model = damped if level else _without_tanks(damped)
-        found.append(frozen_locus(model, air, speeds).flutter)
+        found.append(_first_flutter(model, air))
         advance(f"fill level {level:g}")
     return FillCurve(
         np.array(FILL_LEVELS),

@@ -23,7 +23,7 @@ def printed_and_reached(result: WingResult) -> Table:
     effective = result.effective_mass.get(BETA_HAT)
     found = result.bifurcation
     rows = [
-        ("flutter, frozen", "319.3 m/s, from the first bending", _flutter(result), "an input: stiffness is solved for it"),
+        ("flutter, frozen", "319.3 m/s, from the first bending", _flutter(result), "an input of the stiffness"),
         ("ω_F/ω₁", "1.95", text(result.state.frequency_ratio, 4), "an input, too"),
         (
             "flutter with β̂ = −0.154", "about 2 m/s earlier (of the limit cycle's onset)",
@@ -223,7 +223,8 @@ def tanks(result: WingResult) -> Table:
             tank.name, f"{tank.place_m[1]:.1f}", f"{box.length_m:.2f} × {box.width_m:.2f} × {box.height_m:.2f}",
             text(box.liquid_mass_kg), text(float(omega_bar)), *(text(value) for value in dampers),
         ))  # fmt: skip
-    header = ("tank", "y [m]", "size [m]", "liquid [kg]", "ω̄ at flutter", "c₁ [N s/m]", "c₂ [N s/m]", "c₃ [N s/m]")
+    dampers = tuple(f"{name} [N s/m]" for name in ("c₁", "c₂", "c₃"))
+    header = ("tank", "y [m]", "size [m]", "liquid [kg]", "ω̄ at flutter", *dampers)
     return Table("Tanks", header, tuple(rows), "Dampers by (E.8) from the measured map, at the flutter frequency.")
 
 
@@ -254,6 +255,7 @@ def departures(result: WingResult) -> Table:
     rows = [(name, one.tank, str(one.reason)) for name, one in result.departures]
     return Table(
         "Tanks outside the training of their model", ("case", "tank", "how"), tuple(rows),
-        "Tanks near the root hardly move: weaker than any training. That is told here and not flagged, since what such "
+        "Tanks near the root hardly move: weaker than any training. That is told here and not "
+        "flagged, since what such "
         "a tank does is small; the trained model damps weak motion more than the recordings do.",
     )  # fmt: skip

@@ -180,6 +180,51 @@ def root_locus(
     )
 
 
+def first_flutter(system: System, speeds: FloatArray, *, tolerance_m_per_s: float = 1e-3) -> Crossing | None:
+    """Lowest speed at which any oscillation begins to grow, by eigenvalues alone: no branch is followed.
+
+    Parameters
+    ----------
+    system : callable
+        State matrix at a speed.
+    speeds : ndarray
+        Ascending; one growing oscillation at one of them is enough to be found.
+    tolerance_m_per_s : float
+        Of the bisection.
+
+    Returns
+    -------
+    Crossing or None
+        Without an origin; None if nothing grows, or something does at the first speed already.
+    """
+    low = float(speeds[0])
+    if _fastest_growth(system(low)).real > 0:
+        return None
+    for speed in speeds[1:].tolist():
+        root = _fastest_growth(system(speed))
+        if root.real <= 0:
+            low = speed
+            continue
+        high = speed
+        while high - low > tolerance_m_per_s:
+            middle = 0.5 * (low + high)
+            here = _fastest_growth(system(middle))
+            low, high, root = (low, middle, here) if here.real > 0 else (middle, high, root)
+        return Crossing(0.5 * (low + high), root.imag, "")
+    return None
+
+
+def _fastest_growth(matrix: FloatArray) -> complex:
+    """Of the roots that oscillate, the one that grows fastest; growth below rounding errors is none."""
+    poles = np.linalg.eigvals(matrix)
+    largest = float(np.abs(poles).max())
+    oscillating = poles[poles.imag > _REAL_SHARE * largest]
+    if not oscillating.size:
+        return complex(-1.0)
+    root = complex(oscillating[np.argmax(oscillating.real)])
+    return root if abs(root.real) > 1e-9 * largest else complex(0.0, root.imag)
+
+
 def roots_of(matrix: FloatArray) -> Roots:
     """Eigenvalues and vectors, left vectors scaled so that left·right = 1.
 

@@ -1,4 +1,4 @@
-"""A half wing as a beam along its swept elastic axis: bending in two planes, torsion, an engine, clamped at the root.
+"""A half wing as a beam along its swept elastic axis: bending in two planes, torsion, an engine, a clamped root.
 
 Axes x aft, y to starboard, z up. Sections lie along the flow: their mass centre is behind the axis, and they turn
 with it as rigid bodies.
@@ -30,7 +30,7 @@ from sloshlab.lateral_sloshing.coupling import rigid_motion
 FloatArray = npt.NDArray[np.float64]
 _UP: Final = np.array([0.0, 0.0, 1.0])
 _STRETCH_RADIUS_OVER_CHORD: Final = 0.05
-"""Radius of gyration of the stiff section, from which its stretch follows; wing boxes are a tenth of the chord high."""
+"""Radius of gyration of the stiff section, from which its stretch follows; wing boxes are 0.1 chord high."""
 _N_GAUSS: Final = 4
 """Exact for products of cubic shapes with masses that are linear along an element."""
 _NORMAL_TO_THE_WING: Final = (2, 3, 4)
@@ -48,7 +48,7 @@ def span_nodes_m(wing: WingBeamSection) -> FloatArray:
 def chord_m(wing: WingBeamSection, y_m: npt.ArrayLike) -> FloatArray:
     """Chord along the span."""
     places, chords = zip(*((chord.y_m, chord.chord_m) for chord in wing.chords), strict=True)
-    return np.asarray(np.interp(y_m, places, chords), dtype=np.float64)
+    return np.asarray(np.interp(np.asarray(y_m, dtype=np.float64), places, chords), dtype=np.float64)
 
 
 def axis_places_m(wing: WingBeamSection, y_m: npt.ArrayLike) -> FloatArray:

@@ -1,10 +1,10 @@
-"""Landing of a wing: the fuselage accelerates upward, and the wing feels its gear and its own inertia (3.17, 3.18).
+"""Landing of a wing: the fuselage accelerates upward; the wing feels its gear and its own inertia (3.17, 3.18).
 
     f = b ü_f,   b_n = ½ M_ac i₃·ψ_n(x_gear) − Σ material m i₃·ψ_n − Σ tanks m_l i₃·ψ_n(x_T)
 
-The source prints the inertia of the material alone; the liquid falls and rises with the fuselage as well. Tanks and
-their models move with fuselage and wing together. No recording is printed, so the input is a half sine and a ringing,
-and results are qualitative.
+The source prints the inertia of the material alone; the liquid falls and rises with the fuselage as well. Tanks
+and their models move with fuselage and wing together. No recording is printed, so the input is a half sine and a
+ringing, and results are qualitative.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from sloshlab.lateral_sloshing.coupling import frozen_mass_matrix, rigid_motion
 FloatArray = npt.NDArray[np.float64]
 _UP: Final = 2
 SLOW_RAD_PER_S: Final = 0.5
-"""Below it the velocity of the fuselage is uniform motion, which moves no liquid: models of tanks do not see it, since
-none was trained with it. A tenth of the slowest motion that the largest tank was identified for."""
+"""Below it the velocity of the fuselage is uniform motion, which moves no liquid: models of tanks do not see it,
+as none was trained with it. A tenth of the slowest motion that the largest tank was identified for."""
 
 
 def fuselage_acceleration_m_per_s2(landing: LandingSection, time_s: FloatArray) -> FloatArray:

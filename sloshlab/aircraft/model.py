@@ -181,7 +181,7 @@ class AircraftTank:
     n_sloshing_modes : int
         Of each plane.
     effective_mass_fraction : float
-        β of a vertical force −β m_l ü of the liquid beyond the frozen one; negative where it moves in counter-phase.
+        β of a vertical force −β m_l ü beyond that of the frozen liquid; negative where it moves in counter-phase.
     viscous_damping_n_s_per_m : float
         c of a vertical force −c u̇ in place of sloshing (E.4).
     """
@@ -198,7 +198,7 @@ class AircraftTank:
 
     @property
     def frozen_mass(self) -> FloatArray:
-        """What its frozen liquid adds to the mass matrix, with the effective mass if there is one, shape (n, n)."""
+        """What its frozen liquid adds to the mass matrix, with an effective mass if there is one, shape (n, n)."""
         at_centre = frozen_mass_matrix(self.box, turn_rad=self.turn_rad)
         at_centre[_UP, _UP] += self._effective_mass_kg
         return np.asarray(self.motion.T @ at_centre @ self.motion)

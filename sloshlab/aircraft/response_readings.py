@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Final
 
@@ -11,7 +12,7 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.float64]
 _CYCLES_OF_A_BLOCK: Final = 10
 _STEADY: Final = 0.01
-"""Largest change of the amplitude from one block of cycles to the next, and the spread within one, that is steady."""
+"""Largest change of the amplitude from one block of cycles to the next that is steady."""
 _FEWEST_EXTREMA: Final = 8
 
 
@@ -51,7 +52,7 @@ def extrema(time_s: FloatArray, signal: FloatArray) -> tuple[FloatArray, FloatAr
     """
     crossings = np.flatnonzero(np.signbit(signal[1:]) != np.signbit(signal[:-1])) + 1
     times, values = [], []
-    for first, last in zip(crossings[:-1], crossings[1:], strict=True):
+    for first, last in itertools.pairwise(crossings.tolist()):
         place = first + int(np.argmax(np.abs(signal[first:last])))
         if not 0 < place < signal.size - 1:
             continue

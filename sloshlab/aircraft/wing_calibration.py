@@ -1,7 +1,7 @@
 """Stiffness of a beam wing that flutters at a wanted speed and at a wanted multiple of its first dry frequency.
 
-Both wanted numbers are inputs then. With Mach number and density fixed, all stiffness times s and speeds times √s is
-the same flutter at √s times the frequency: EI at the root sets the speed in one step, GJ/EI the ratio of
+Both wanted numbers are inputs then. With Mach number and density fixed, all stiffness times s and speeds times √s
+is the same flutter at √s times the frequency: EI at the root sets the speed in one step, GJ/EI the ratio of
 frequencies, and only the extra damping of modes above a frequency breaks the similarity.
 """
 

@@ -168,8 +168,8 @@ def energy_map(
     Notes
     -----
     The map is undefined where a tank moves faster or more than was measured, and where the tank that takes most
-    moves less; a tank that takes less than that one and is below the weakest measured motion takes W̄ of that motion,
-    which is small.
+    moves less; a tank that takes less than that one and is below the weakest measured motion takes W̄ of that
+    motion, which is small.
     """
     liquid = TankWork(model, w_bar)
     density = model.density_kg_per_m3
@@ -210,8 +210,8 @@ class TankWork:
         Returns
         -------
         w_bar : ndarray, shape (n,)
-            Linear between grid lines; NaN where nothing was measured or the motion is stronger, and W̄ of the weakest
-            measured motion where it is weaker.
+            Linear between grid lines; NaN where nothing was measured or the motion is stronger, and W̄ of the
+            weakest measured motion where it is weaker.
         is_below : ndarray of bool, shape (n,)
             Where it is weaker.
         """
