@@ -16,6 +16,7 @@ TRIAL_KEY ?= $(HOME)/.config/sloshlab/trial_$(TRIAL_SEED).key
 RIVALS_SEED ?= 4101
 RECORDINGS := raw_data/numerical_tank/shaker
 ROM := $(RESULTS)/rom/ROM.nc
+MAPS := $(RESULTS)/shaker/maps.nc
 BALLS :=
 PATIENCE ?= 30
 FUZZ_SECONDS ?= 600
@@ -23,7 +24,7 @@ VERSION = $(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' sloshlab/_version.py)
 DOCS_BRANCH ?= gh-pages
 
 .DEFAULT_GOAL := help
-.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks aircraft rom-study closed-loop replay campaign tank-campaign pictures tank-diagnosis trial rivals test test-newest test-all lint format type bench fuzz soak wheel docs docs-publish clean
+.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks aircraft wing rom-study closed-loop replay campaign tank-campaign pictures tank-diagnosis trial rivals test test-newest test-all lint format type bench fuzz soak wheel docs docs-publish clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -81,6 +82,10 @@ aircraft: setup  ## a flying wing with one tank and with two: flutter, gusts, pl
 	for case in 1 2; do $(BIN)/sloshlab aircraft raw_data/aircraft/maewing1/case_$$case.toml --rom $(ROM) \
 	  --cache $(RESULTS)/aircraft/forces $$([ $$case = 1 ] || echo --scan raw_data/aircraft/maewing1/offset_scan.toml) \
 	  -o $(RESULTS)/aircraft/case_$$case || [ $$? -eq 3 ] || exit 1; done
+
+wing: setup  ## the wing with eight tanks, with the model of `make rom` and maps of `make shaker` (or ROM=, MAPS=): report
+	$(BIN)/sloshlab wing raw_data/aircraft/single_aisle/wing.toml --rom $(ROM) --maps $(MAPS) --match-fold 323 \
+	  --cache $(RESULTS)/forces -o $(RESULTS)/wing || [ $$? -eq 3 ]
 
 rom-study: setup  ## the sensitivity study of reduced-order models (up to an hour; goes on where it was stopped)
 	$(BIN)/python -m pipelines.experiments study raw_data/numerical_tank/shaker $(RESULTS)/rom_study

@@ -207,7 +207,9 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "fill_flutter_speed": Quantity("m s-1", "flutter speed over the fill level, liquids frozen", "U_F"),
     "fill_flutter_frequency": Quantity("rad s-1", "its angular frequency", "ω_F"),
     "effective_mass_flutter_speed": Quantity("m s-1", "flutter speed with an effective mass in all tanks", "U_F"),
-    "fuselage_velocity": Quantity("m s-1", "vertical velocity of the fuselage since touchdown, up positive", "u̇_f"),
+    "fuselage_velocity": Quantity(
+        "m s-1", "vertical velocity of the fuselage since touchdown, up positive", "u̇_f"
+    ),
     "continuation": Quantity("1", "where motions began: at rest, or as that of the speed before ended"),
     "cycle_amplitude": Quantity("m", "amplitude of the tip that a motion ended with", "a"),
     "cycle_frequency": Quantity("rad s-1", "angular frequency of the motion", "ω"),

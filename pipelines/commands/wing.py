@@ -39,7 +39,7 @@ def wing(
         ),
     ] = None,
     first: Annotated[float, typer.Option("--from", metavar="U", help="Lowest speed of limit cycles.")] = 316.0,
-    last: Annotated[float, typer.Option("--to", metavar="U", help="Highest speed of limit cycles.")] = 330.0,
+    last: Annotated[float, typer.Option("--to", metavar="U", help="Highest speed of limit cycles.")] = 340.0,
     speeds: Annotated[int, typer.Option("--speeds", help="How many of them, evenly.")] = 15,
     duration: Annotated[float, typer.Option("--duration", metavar="S", help="Of each gust.")] = 20.0,
     patience: Annotated[

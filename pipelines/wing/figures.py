@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 FloatArray = npt.NDArray[np.float64]
 PRINTED_FLUTTER_M_PER_S = 319.3
 PRINTED_FOLD_M_PER_S = 323.0
+_SHORT_S = 5.0
 _MODEL_COLOURS = {FROZEN: NEUTRAL_COLOUR, SLOSHING: DISTINCT_COLOURS[1]}
 
 
@@ -133,11 +134,11 @@ def gust(name: str, *, case: GustCase, counterpart: str) -> ReportFigure:
     """Acceleration of the tip, and forces of the liquid."""
     figure = new_figure(4.6)
     tip, force = figure.subplots(2, 1, sharex=True, height_ratios=(1.5, 1.0))
-    shown_s = 6.0
-    for model in (FROZEN, SLOSHING):
-        reading = case.readings[model]
+    both = [case.readings[model] for model in (FROZEN, SLOSHING)]
+    shown_s = _SHORT_S if all(_dies(reading.displacement_m) for reading in both) else np.inf
+    for model, reading in zip((FROZEN, SLOSHING), both, strict=True):
         time = reading.record.response.time_s
-        until = time <= shown_s if _dies(reading.displacement_m) else np.ones(time.shape, bool)
+        until = time <= shown_s
         tip.plot(
             time[until], reading.acceleration_m_per_s2[until] / GRAVITY_M_PER_S2, color=_MODEL_COLOURS[model],
             linewidth=1.0, label=model,
@@ -147,7 +148,7 @@ def gust(name: str, *, case: GustCase, counterpart: str) -> ReportFigure:
     if frozen > 3 * largest:
         tip.set_ylim(-3 * largest, 3 * largest)
     response = case.readings[SLOSHING].record.response
-    until = response.time_s <= tip.get_xlim()[1]
+    until = response.time_s <= shown_s
     for number, tank in enumerate(response.flight.model.tanks):
         force.plot(
             response.time_s[until], response.force_n[until, number] / 1e3, linewidth=0.8,
@@ -156,7 +157,7 @@ def gust(name: str, *, case: GustCase, counterpart: str) -> ReportFigure:
     tip.set_ylabel("acceleration of the tip [g]")
     force.set_ylabel("Δf [kN]")
     force.set_xlabel("time [s]")
-    tip.legend(loc="upper right", ncols=2)
+    tip.legend(loc="upper right", ncols=2, frameon=True, framealpha=0.9, edgecolor="none")
     figure.legend(*force.get_legend_handles_labels(), loc="outside lower center", ncols=8, handlelength=1.0)
     speed, w = case.case.speed_m_per_s, case.case.amplitude_m_per_s
     printed = case.printed_m_per_s

@@ -17,9 +17,10 @@ from sloshlab.aeroelastic.generalised_force_cache import CacheStatus
 from sloshlab.aeroelastic.root_locus import Crossing
 from sloshlab.aircraft.limit_cycle import BranchPoint
 from sloshlab.aircraft.response_readings import LimitCycle, PeakDamping
-from sloshlab.aircraft.vertical_sloshing import TankDeparture
+from sloshlab.aircraft.vertical_sloshing import LARGEST_ACCELERATION_G, TankDeparture
 from sloshlab.aircraft.wing_calibration import WingState
 from sloshlab.aircraft.wing_energy import EnergyMap
+from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.errors import InputError
 
 FloatArray = npt.NDArray[np.float64]
@@ -31,6 +32,8 @@ GUSTS: Final = ((266.0, 6.0), (315.0, 3.0), (321.0, 1.5), (321.0, 0.15), (321.0,
 FROZEN: Final = "frozen"
 SLOSHING: Final = "sloshing"
 """Models: frozen liquids, and trained networks in all tanks."""
+LOWEST_LEVEL_G: Final = 0.25
+"""Of the sweeps on the shaker; what a tank does that moves less is told in a table, and not flagged."""
 SMALL_GUST_M_PER_S: Final = 0.15
 """w_ga of the bifurcation diagram (Fig. 3.11)."""
 LOWEST_SPEED_M_PER_S: Final = 250.0
@@ -65,8 +68,8 @@ class WingSettings:
     duration_s: float = 20.0
     gust_length_m: float | None = None
     first_m_per_s: float = 316.0
-    last_m_per_s: float = 330.0
-    n_bifurcation: int = 15
+    last_m_per_s: float = 340.0
+    n_bifurcation: int = 13
     longest_s: float = 60.0
     n_speeds: int = 56
 
@@ -164,9 +167,17 @@ class Bifurcation:
     @property
     def onset_m_per_s(self) -> float:
         """Middle between the last speed where the motion dies and the first with a limit cycle, going down."""
-        living = sorted(point.speed_m_per_s for point in self.down if point.is_alive)
-        dead = sorted(point.speed_m_per_s for point in self.down if not point.is_alive)
-        return 0.5 * (living[0] + dead[-1]) if living and dead else float("nan")
+        living = [point.speed_m_per_s for point in self.down if point.is_alive]
+        dead = [p.speed_m_per_s for p in self.down if not p.is_alive and living and p.speed_m_per_s < min(living)]
+        return 0.5 * (min(living) + max(dead)) if living and dead else float("nan")
+
+    @property
+    def flags(self) -> list[str]:
+        """Limit cycles at which a tank leaves 6 g."""
+        points = (*self.from_rest, *self.up, *self.down)
+        largest = LARGEST_ACCELERATION_G * GRAVITY_M_PER_S2
+        beyond = [p.speed_m_per_s for p in points if p.is_alive and p.largest_tank_acceleration_m_per_s2 > largest]
+        return [f"limit cycles have tanks beyond 6 g from {min(beyond):g} m/s on"] if beyond else []
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,6 +204,12 @@ class FillCurve:
     fill_level: FloatArray
     flutter_speed_m_per_s: FloatArray
     flutter_frequency_rad_per_s: FloatArray
+
+
+def _matters(departure: TankDeparture) -> bool:
+    """Whether a departure is flagged: not where the tank moved less than at the lowest level of any training."""
+    reason = departure.reason
+    return isinstance(reason, str) or reason.acceleration_g >= LOWEST_LEVEL_G
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,7 +266,8 @@ class WingResult:
         targets = self.state.described.calibration
         found = [] if targets is None else self.state.misses(targets)
         found += list(self.stability.flags)
-        found += [f"{name}: {one}" for name, one in self.departures if one.kind != "too weak"]
+        found += [f"{name}: {one}" for name, one in self.departures if _matters(one)]
+        found += self.bifurcation.flags
         found += [
             f"{case.case.name}, {run.model}: {run.response.ending}"
             for case in self.cases

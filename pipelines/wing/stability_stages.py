@@ -161,16 +161,14 @@ def bifurcation(
     def at(speed: float) -> LinearFlight:
         return flight_at(state.model, state.air, speed)
 
-    up = followed(
-        at, tanks.forces(), node,
-        speeds.tolist(), settling, first_gust=gust, advance=advance,
-    )  # fmt: skip
+    forces = tanks.forces()
+    up, state = followed(at, forces, node, speeds.tolist(), settling, first_gust=gust, advance=advance)
     kept = [point.speed_m_per_s for point in up if not point.ending]
-    down = followed(
-        at, tanks.forces(), node,
-        sorted(kept, reverse=True), settling,
-        first_gust=gust_of(state, settings, float(speeds[-1]), 10 * SMALL_GUST_M_PER_S), advance=advance,
-    )  # fmt: skip
+    if len(kept) < len(up):
+        # the models went wild with the last motion; the branch is begun anew at the last speed that kept one
+        forces, state = tanks.forces(), None
+    falling = sorted(kept, reverse=True)
+    down, _ = followed(at, forces, node, falling, settling, first_gust=gust, start=state, advance=advance)
     rest: list[BranchPoint] = []
     for speed in speeds.tolist():
         small = gust_of(state, settings, speed, SMALL_GUST_M_PER_S)

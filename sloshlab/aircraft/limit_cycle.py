@@ -40,7 +40,7 @@ class BranchPoint:
     duration_s: float
     largest_tank_acceleration_m_per_s2: float
     ending: str = ""
-    vanished_m: float = 2e-4
+    vanished_m: float = 1e-3
 
     @property
     def is_alive(self) -> bool:
@@ -82,7 +82,7 @@ class Settling:
 
     stretch_s: float = 10.0
     longest_s: float = 60.0
-    vanished_m: float = 2e-4
+    vanished_m: float = 1e-3
     output_step_s: float = 5e-3
 
 
@@ -148,8 +148,9 @@ def followed(
     settling: Settling,
     *,
     first_gust: GustShape,
+    start: FloatArray | None = None,
     advance: Callable[[str], None] | None = None,
-) -> list[BranchPoint]:
+) -> tuple[list[BranchPoint], FloatArray | None]:
     """Continuation: each speed starts from the motion and the liquid that the speed before ended with.
 
     Parameters
@@ -162,12 +163,21 @@ def followed(
         In the order in which they are followed.
     settling : Settling
     first_gust : callable
-        What starts the first motion, and any after one that has died or diverged.
+        What starts the first motion, and any after one that has died.
+    start : ndarray, optional
+        State from which the first speed goes on, with the liquid as `tanks` have it; else it starts from rest.
     advance : callable, optional
         Told each speed.
+
+    Returns
+    -------
+    points : list of BranchPoint
+        Up to the first that diverges.
+    state : ndarray or None
+        Of the last motion that was alive, with which `tanks` go on if it was the last; None if that has died.
     """
     points: list[BranchPoint] = []
-    state: FloatArray | None = None
+    state = start
     for speed in speeds_m_per_s:
         gust = first_gust if state is None else None
         settled = settle(flight_at(speed), tanks, tip_node, settling, state=state, gust=gust)
@@ -177,4 +187,4 @@ def followed(
             advance(f"{speed:.2f} m/s")
         if settled.point.ending:
             break
-    return points
+    return points, state

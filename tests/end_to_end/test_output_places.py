@@ -25,6 +25,7 @@ FOLDERS: dict[str, list[str]] = {
     "benchmark -o": ["benchmark", "silverbox", "--data", "absent"],
     "flutter -o": ["flutter", "absent.toml", "--from", "60", "--to", "180"],
     "aircraft -o": ["aircraft", "absent.toml"],
+    "wing -o": ["wing", "absent.toml", "--rom", "absent_rom.nc"],
     "campaign -o": ["campaign", "absent"],
     "trial seal -o": ["trial", "seal", "--key", "absent.key"],
     "trial score -o": ["trial", "score", "absent"],

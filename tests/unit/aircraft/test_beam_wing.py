@@ -37,7 +37,9 @@ def test_a_uniform_wing_has_the_modes_of_a_cantilever() -> None:
 
 def test_a_swept_wing_is_a_longer_beam() -> None:
     sweep = 35.0
-    swept = wing_structure(small_wing(wing={**UNIFORM, "leading_edge_sweep_deg": sweep, "torsion_over_bending": 1e3}))
+    swept = wing_structure(
+        small_wing(wing={**UNIFORM, "leading_edge_sweep_deg": sweep, "torsion_over_bending": 1e3})
+    )
     cosine = np.cos(np.radians(sweep))
     # the same mass on a length L/cos Λ
     expected = 1.8751040687**2 * np.sqrt(2e6 / (40.0 * cosine)) * cosine**2 / 10.0**2
@@ -55,7 +57,9 @@ def test_mass_and_centre_are_those_of_the_sections_and_the_engine() -> None:
     total = np.trapezoid(mass, y) + 100.0
     engine_x = 3.3 * np.tan(np.radians(20.0)) + 0.8 - 0.5
     assert structure.rigid_mass[0, 0] == pytest.approx(total)
-    assert structure.mass_centre_m[0] == pytest.approx((np.trapezoid(mass * x, y) + 100 * engine_x) / total, rel=1e-6)
+    assert structure.mass_centre_m[0] == pytest.approx(
+        (np.trapezoid(mass * x, y) + 100 * engine_x) / total, rel=1e-6
+    )
     assert structure.mass_centre_m[1] == pytest.approx((np.trapezoid(mass * y, y) + 330.0) / total, rel=1e-6)
 
 
