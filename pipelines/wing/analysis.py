@@ -26,6 +26,7 @@ from pipelines.wing.stability_stages import (
 )
 from sloshlab.aeroelastic.generalised_force_cache import CacheStatus
 from sloshlab.aeroelastic.generalised_forces import GeneralisedForces
+from sloshlab.aircraft.beam_wing import wing_model
 from sloshlab.aircraft.linear_sloshing import DAMPER_CHOICES, dampers_of_map
 from sloshlab.aircraft.wing_air import air_on_modes, air_on_nodes
 from sloshlab.aircraft.wing_calibration import WingState, calibrated, wing_state
@@ -58,6 +59,8 @@ class _Pipeline:
             raise InputError(option, got="a wing without [calibration]", remedy="state its two targets")
         if maps is None and settings.match_fold_m_per_s is not None:
             raise InputError("--match-fold", got="no --maps", remedy="give the measured maps, which tell the fold")
+        # refused before any work, not after it
+        load_tank_models(wing_model(self.described), rom)
         fills = {tank.fill_level for tank in self.described.tanks}
         self.maps = None if maps is None else read_maps(maps, fill_level=float(np.mean(list(fills))))
 
@@ -180,8 +183,6 @@ def analyse_wing(
         nodes, status = pipeline.air(described.flow.mach)
         landing_air = None if described.landing is None else pipeline.air(described.landing.mach)[0]
         state = pipeline.state(described, nodes, calibrate=settings.calibrate)
-        # refused before hours of work, not after them
-        load_tank_models(state.model, rom)
         speeds = settings.bifurcation_speeds_m_per_s
         n_steps = 2 + len(GUSTS) + len(DAMPER_CHOICES) + 2 + len(FILL_LEVELS) + 3 * speeds.size
         with progress("wing", n_steps) as advance:

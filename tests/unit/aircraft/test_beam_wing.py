@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from pathlib import Path
 
 import numpy as np
@@ -118,3 +120,11 @@ def test_a_file_with_an_unknown_key_is_refused_by_its_place(tmp_path: Path) -> N
     (tmp_path / "wing.toml").write_text(text)
     with pytest.raises(InputError, match=r"wing\.elastic_ax"):
         load_wing(tmp_path / "wing.toml")
+
+
+def test_the_file_of_the_project_is_the_one_of_its_manifest() -> None:
+    manifest = json.loads((SINGLE_AISLE.parent / "manifest.json").read_text())
+    for name, told in manifest["files"].items():
+        content = (SINGLE_AISLE.parent / name).read_bytes()
+        assert len(content) == told["bytes"]
+        assert hashlib.sha256(content).hexdigest() == told["sha256"]

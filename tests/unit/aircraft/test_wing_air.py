@@ -18,8 +18,17 @@ from sloshlab.aircraft.wing_calibration import calibrated, wing_state
 from sloshlab.aircraft.wing_file import CalibrationTargets
 
 pytestmark = pytest.mark.skipif(find_spec("panelaero") is None, reason="needs PanelAero")
+AROUND_M_PER_S = 70.0
 DESCRIBED = small_wing(
-    wing={"leading_edge_sweep_deg": 15.0, "mass_centre_behind_axis": 0.12, "torsion_over_bending": 0.3, "n_modes": 5}
+    # damping in all modes, or the one in the plane, which no air damps, would flutter first
+    wing={
+        "leading_edge_sweep_deg": 15.0,
+        "mass_centre_behind_axis": 0.12,
+        "torsion_over_bending": 0.3,
+        "n_modes": 5,
+        "extra_damping_ratio": 0.01,
+        "extra_damping_above": 0.0,
+    },
 )
 
 
@@ -41,16 +50,16 @@ def test_air_of_modes_is_that_of_their_motion(nodes: GeneralisedForces) -> None:
 
 
 def test_flutter_by_eigenvalues_is_that_of_the_branches(nodes: GeneralisedForces) -> None:
-    state = wing_state(DESCRIBED, nodes, 150.0)
+    state = wing_state(DESCRIBED, nodes, AROUND_M_PER_S)
     assert state.flutter is not None
     system = flight_system(state.model, state.air.motion, "frozen", density_kg_per_m3=1.0)
-    speeds = np.linspace(20.0, 225.0, 42)
+    speeds = np.linspace(10.0, 105.0, 42)
     found = first_flutter(system.matrix_at, speeds)
     first = state.earlier or state.flutter
     assert found is not None
     assert found.speed_m_per_s == pytest.approx(first.speed_m_per_s, abs=2e-3)
     assert found.frequency_rad_per_s == pytest.approx(first.frequency_rad_per_s, rel=1e-4)
-    assert first_flutter(system.matrix_at, np.array([20.0, 0.9 * found.speed_m_per_s])) is None
+    assert first_flutter(system.matrix_at, np.array([10.0, 0.9 * found.speed_m_per_s])) is None
     assert first_flutter(system.matrix_at, np.array([1.01, 1.1]) * found.speed_m_per_s) is None
 
 
@@ -58,7 +67,7 @@ def test_speed_goes_with_the_root_of_the_stiffness(nodes: GeneralisedForces) -> 
     states = []
     for factor in (1.0, 1.21):
         wing = DESCRIBED.wing.model_copy(update={"root_bending_stiffness_n_m2": factor * 2e6})
-        states.append(wing_state(DESCRIBED.model_copy(update={"wing": wing}), nodes, 150.0))
+        states.append(wing_state(DESCRIBED.model_copy(update={"wing": wing}), nodes, AROUND_M_PER_S))
     first, second = (state.flutter for state in states)
     assert first is not None
     assert second is not None
@@ -67,7 +76,7 @@ def test_speed_goes_with_the_root_of_the_stiffness(nodes: GeneralisedForces) -> 
 
 
 def test_calibration_meets_targets_that_another_wing_has(nodes: GeneralisedForces) -> None:
-    wanted = wing_state(DESCRIBED, nodes, 150.0)
+    wanted = wing_state(DESCRIBED, nodes, AROUND_M_PER_S)
     assert wanted.flutter is not None
     targets = CalibrationTargets(
         flutter_speed_m_per_s=wanted.flutter.speed_m_per_s, frequency_ratio=wanted.frequency_ratio
@@ -77,5 +86,5 @@ def test_calibration_meets_targets_that_another_wing_has(nodes: GeneralisedForce
     assert found.misses(targets) == []
     assert found.described.wing.root_bending_stiffness_n_m2 == pytest.approx(2e6, rel=0.02)
     assert found.described.wing.torsion_over_bending == pytest.approx(0.3, rel=0.02)
-    far = CalibrationTargets(flutter_speed_m_per_s=wanted.flutter.speed_m_per_s + 5, frequency_ratio=9.0)
+    far = CalibrationTargets(flutter_speed_m_per_s=wanted.flutter.speed_m_per_s + 1, frequency_ratio=9.0)
     assert len(wanted.misses(far)) == 2

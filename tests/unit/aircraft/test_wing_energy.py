@@ -8,15 +8,15 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 import xarray as xr
+from small_wings import small_wing
 
 from sloshlab.aeroelastic.energy import energy_of_mode, work_of_dampers, work_of_forces
 from sloshlab.aircraft.beam_wing import wing_model
-from sloshlab.aircraft.linear_flight import LinearFlight, linear_flight
 from sloshlab.aircraft.limit_cycle import Settling, followed, settle
+from sloshlab.aircraft.linear_flight import LinearFlight, linear_flight
 from sloshlab.aircraft.model import AircraftModel
 from sloshlab.aircraft.response_readings import damping_between_peaks, limit_cycle_of
 from sloshlab.aircraft.wing_energy import CriticalMode, EnergyMap, TankWork
-from small_wings import small_wing
 
 RANDOM = np.random.default_rng(5)
 
