@@ -105,27 +105,35 @@ def modes(name: str, *, result: WingResult) -> ReportFigure:
 
 
 def fill_level(name: str, *, result: WingResult) -> ReportFigure:
-    """Flutter speed over the fill level, and with effective masses."""
+    """Flutter speed over the fill level, and over the effective mass."""
     figure = new_figure(3.2)
-    axes = figure.subplots()
+    over_fill, over_mass = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
     fills = result.fills
-    axes.plot(fills.fill_level, fills.flutter_speed_m_per_s, "o-", color=NEUTRAL_COLOUR, label="frozen liquids")
-    labels = {BETA_HAT: f"β̂ = {BETA_HAT:g}, of the source", -BETA_HAT: "with the sign as printed in (3.14)"}
-    fill = result.state.described.tanks[0].fill_level
-    for number, (beta, flutter) in enumerate(result.effective_mass.items()):
-        if flutter is not None:
-            label = labels.get(beta, f"β̂ = {beta:.3f}, of the map at 0.25 g").replace("-", "−")
-            axes.plot(
-                fill, flutter.speed_m_per_s, DISTINCT_MARKERS[1 + number], color=DISTINCT_COLOURS[1 + number],
-                markersize=6, mfc="none", label=label,
-            )  # fmt: skip
-    axes.set_xlabel("fill level α of all tanks")
-    axes.set_ylabel("flutter speed U_F [m/s]")
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=2)
+    over_fill.plot(fills.fill_level, fills.flutter_speed_m_per_s, "o-", color=NEUTRAL_COLOUR)
+    over_fill.set_xlabel("fill level α of all tanks")
+    over_fill.set_ylabel("flutter speed U_F [m/s]")
+    over_fill.set_title("frozen liquids")
+    speeds = {beta: one.speed_m_per_s for beta, one in result.effective_mass.items() if one is not None}
+    if result.state.flutter is not None:
+        speeds[0.0] = result.state.flutter.speed_m_per_s
+    betas = sorted(speeds)
+    over_mass.plot(betas, [speeds[beta] for beta in betas], "-", color=NEUTRAL_COLOUR, linewidth=0.8)
+    labels = {BETA_HAT: "source, −0.154", -BETA_HAT: "sign as printed", 0.0: "frozen"}
+    for number, beta in enumerate(betas):
+        label = labels.get(beta, f"map at 0.25 g, {beta:.3f}".replace("-", "−"))
+        over_mass.plot(
+            beta, speeds[beta], DISTINCT_MARKERS[number], color=DISTINCT_COLOURS[number], markersize=6, label=label
+        )
+    over_mass.set_xlabel("effective-mass fraction β̂")
+    over_mass.set_title("effective mass (1 + β̂) m_l")
+    over_mass.ticklabel_format(axis="y", useOffset=False)
+    over_mass.legend(loc="upper left", fontsize=7.5)
+    low, high = over_mass.get_ylim()
+    over_mass.set_ylim(low, high + 0.6 * (high - low))
     caption = (
-        "Flutter speed over the fill level with frozen liquids, and at the fill level of the file "
-        "with an effective "
-        "mass (1 + β̂) m_l that moves up and down. The sign of (3.14) as printed makes the mass grow."
+        "Flutter speed over the fill level with frozen liquids; at the fill level of the file over "
+        "the share of the "
+        "liquid that moves up and down with its tanks. The sign of (3.14) as printed makes that mass grow."
     )
     return ReportFigure(name, caption, "Fig. 3.6", png_bytes(figure))
 
