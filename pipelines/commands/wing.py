@@ -40,7 +40,7 @@ def wing(
     ] = None,
     first: Annotated[float, typer.Option("--from", metavar="U", help="Lowest speed of limit cycles.")] = 316.0,
     last: Annotated[float, typer.Option("--to", metavar="U", help="Highest speed of limit cycles.")] = 340.0,
-    speeds: Annotated[int, typer.Option("--speeds", help="How many of them, evenly.")] = 15,
+    speeds: Annotated[int, typer.Option("--speeds", help="How many of them, evenly.")] = 13,
     duration: Annotated[float, typer.Option("--duration", metavar="S", help="Of each gust.")] = 20.0,
     patience: Annotated[
         float, typer.Option("--patience", metavar="S", help="Simulated at most for a limit cycle at each speed.")
