@@ -127,7 +127,9 @@ def settle(
             gust=gust, initial_state=state,
         )  # fmt: skip
         going, gust = {name: _Going(tank) for name, tank in tanks.items()}, None
-        duration += float(response.time_s[-1]) if response.time_s.size else 0.0
+        if not response.time_s.size:
+            return _at_once(flight, settling, duration, response)
+        duration += float(response.time_s[-1])
         state = response.states[-1]
         cycle = limit_cycle_of(response.time_s, response.states @ displacement)
         has_died = cycle.amplitude < settling.vanished_m
@@ -138,6 +140,13 @@ def settle(
                 flight.speed_m_per_s, cycle, duration, largest, response.ending, settling.vanished_m
             )
             return Settled(point, state, response)
+
+
+def _at_once(flight: LinearFlight, settling: Settling, duration_s: float, response: FlightResponse) -> Settled:
+    """A motion whose model of a tank ran away before the first output."""
+    none = LimitCycle(float("nan"), float("nan"), float("nan"), False)
+    point = BranchPoint(flight.speed_m_per_s, none, duration_s, float("nan"), response.ending, settling.vanished_m)
+    return Settled(point, np.zeros(flight.n_states), response)
 
 
 def followed(
