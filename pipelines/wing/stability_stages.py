@@ -162,13 +162,13 @@ def bifurcation(
         return flight_at(state.model, state.air, speed)
 
     forces = tanks.forces()
-    up, state = followed(at, forces, node, speeds.tolist(), settling, first_gust=gust, advance=advance)
+    up, last = followed(at, forces, node, speeds.tolist(), settling, first_gust=gust, advance=advance)
     kept = [point.speed_m_per_s for point in up if not point.ending]
     if len(kept) < len(up):
         # the models went wild with the last motion; the branch is begun anew at the last speed that kept one
-        forces, state = tanks.forces(), None
+        forces, last = tanks.forces(), None
     falling = sorted(kept, reverse=True)
-    down, _ = followed(at, forces, node, falling, settling, first_gust=gust, start=state, advance=advance)
+    down, _ = followed(at, forces, node, falling, settling, first_gust=gust, start=last, advance=advance)
     rest: list[BranchPoint] = []
     for speed in speeds.tolist():
         small = gust_of(state, settings, speed, SMALL_GUST_M_PER_S)

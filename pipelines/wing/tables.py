@@ -223,8 +223,8 @@ def tanks(result: WingResult) -> Table:
             tank.name, f"{tank.place_m[1]:.1f}", f"{box.length_m:.2f} × {box.width_m:.2f} × {box.height_m:.2f}",
             text(box.liquid_mass_kg), text(float(omega_bar)), *(text(value) for value in dampers),
         ))  # fmt: skip
-    dampers = tuple(f"{name} [N s/m]" for name in ("c₁", "c₂", "c₃"))
-    header = ("tank", "y [m]", "size [m]", "liquid [kg]", "ω̄ at flutter", *dampers)
+    coefficients = tuple(f"{name} [N s/m]" for name in ("c₁", "c₂", "c₃"))
+    header = ("tank", "y [m]", "size [m]", "liquid [kg]", "ω̄ at flutter", *coefficients)
     return Table("Tanks", header, tuple(rows), "Dampers by (E.8) from the measured map, at the flutter frequency.")
 
 
