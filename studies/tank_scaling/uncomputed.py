@@ -4,7 +4,8 @@ Both are estimated from the computed flow, after the fact:
 
 wall layers
     The computed walls slip. A layer of an oscillating flow of speed U sin Ωt along a wall dissipates ½ρU² √(νΩ/2)
-    per area and time (Landau & Lifshitz, Fluid Mechanics, § 24), that is ρ⟨u²⟩ √(νΩ/2) with the mean square. In similarity it falls with λ^(−3/4) = Re^(−1/2).
+    per area and time (Landau & Lifshitz, Fluid Mechanics, § 24), that is ρ⟨u²⟩ √(νΩ/2) with the mean square.
+    In similarity it falls with λ^(−3/4) = Re^(−1/2).
 surface tension
     Surface that is made costs σ per area. If all the surface beyond that at rest were made anew twice in a cycle,
     and none of its energy came back, the work were 2σ(A − A₀). It falls with λ⁻² = 1/Bo. Drops smaller than the
