@@ -172,3 +172,26 @@ def test_a_tank_under_a_flying_wing_changes_its_flutter(run_script: Callable[[st
     assert names["flutter"]["frozen"].speed_m_per_s == pytest.approx(32.02, rel=0.025)
     assert names["speed"] == pytest.approx(31.60 / 32.02 - 1, abs=0.002)
     assert names["frequency"] == pytest.approx(0.009, abs=0.002)
+
+
+@pytest.mark.slow
+def test_a_model_of_the_shaker_holds_an_aircraft_in_a_limit_cycle(run_script: Callable[[str], Names]) -> None:
+    """Frozen it grows as the root says; free it decays, swings on, or grows faster than the liquid can take."""
+    names = run_script("14_from_shaker_to_flutter")
+    assert names["factors"].time == pytest.approx((0.13 / 0.0272) ** 0.5)
+    # 1.3689 kg against 0.12432 kg
+    assert names["factors"].force == pytest.approx(0.18 * 0.18 * 0.065 * 650 / (0.1172 * 0.0136 * 0.078 * 1000))
+
+    def peak_g(response: Any, start_s: float, end_s: float) -> float:
+        within = (response.time_s > start_s) & (response.time_s < end_s)
+        return float(np.abs(response.tank_acceleration_m_per_s2[within, 0]).max()) / 9.81
+
+    system, speed = names["system"], 1.01 * names["flutter"].speed_m_per_s
+    growth = np.linalg.eigvals(system.matrix_at(speed)).real.max()
+    frozen = names["frozen"]
+    assert np.log(peak_g(frozen, 18, 20) / peak_g(frozen, 13, 15)) == pytest.approx(5 * growth, rel=0.05)
+    near, cycle, far = names["free"].values()
+    assert peak_g(near, 18, 20) < 0.1 * peak_g(near, 2, 4)
+    assert peak_g(cycle, 17, 20) == pytest.approx(peak_g(cycle, 14, 17), rel=0.01)
+    assert 0.8 < peak_g(cycle, 17, 20) < 2
+    assert "diverges" in far.ending
