@@ -17,6 +17,7 @@ RIVALS_SEED ?= 4101
 RECORDINGS := raw_data/numerical_tank/shaker
 ROM := $(RESULTS)/rom/ROM.nc
 MAPS := $(RESULTS)/shaker/maps.nc
+SCALING_ROM := $(RESULTS)/tank_scaling/ROM_60x20.nc
 BALLS :=
 PATIENCE ?= 30
 FUZZ_SECONDS ?= 600
@@ -24,7 +25,7 @@ VERSION = $(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' sloshlab/_version.py)
 DOCS_BRANCH ?= gh-pages
 
 .DEFAULT_GOAL := help
-.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks aircraft wing rom-study closed-loop replay campaign tank-campaign pictures tank-diagnosis trial rivals test test-newest test-all lint format type bench fuzz soak wheel docs docs-publish clean
+.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks aircraft wing rom-study closed-loop replay campaign tank-campaign tank-scaling pictures tank-diagnosis trial rivals test test-newest test-all lint format type bench fuzz soak wheel docs docs-publish clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -101,6 +102,14 @@ demo-cases: setup  ## draw the sealed cases of raw_data/cases again (a minute)
 
 tank-campaign: setup  ## compute the recordings of raw_data/numerical_tank again (hours; goes on where it was stopped)
 	$(BIN)/sloshlab virtual campaign --liquid numerical -o raw_data/numerical_tank
+
+tank-scaling: setup  ## the scaling law tested: the numerical tank at seven sizes (15 min; goes on where it was stopped)
+	mkdir -p $(RESULTS)/tank_scaling
+	test -f $(SCALING_ROM) || $(BIN)/sloshlab train raw_data/numerical_tank/shaker/fill_0.50_vfa_480s.nc \
+	  raw_data/numerical_tank/shaker/fill_0.50_vfa_240s.nc --rig raw_data/numerical_tank/shaker/rig_fill_0.50.toml \
+	  --still raw_data/numerical_tank/shaker/fill_0.50_empty_3.00g.nc \
+	  --still raw_data/numerical_tank/shaker/fill_0.50_frozen_3.00g.nc --delays 60 --neurons 20 --no-report -o $(SCALING_ROM)
+	$(BIN)/python -m studies.tank_scaling $(RESULTS)/tank_scaling --model $(SCALING_ROM)
 
 pictures: setup  ## the snapshots and the film of the numerical tank in docs/images again (minutes)
 	$(BIN)/python -m studies.numerical_tank_figures --rig raw_data/shaker/rig_fill_0.50.toml

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from sloshlab.errors import InputError
 from sloshlab.reduced_order_model.model import ReducedOrderModel, Scaling
+from sloshlab.reduced_order_model.scaling_error import ScalingError, scaling_error
 from sloshlab.rig import Rig
 
 HYPOTHESES: Final = (
@@ -96,6 +97,13 @@ class TankScaling:
         """Whether nothing has to be scaled."""
         return max(abs(factor - 1) for factor in (self.time, self.velocity, self.force)) < _SAME
 
+    @property
+    def error(self) -> ScalingError:
+        """What the law may be wrong by; the liquid is taken to be the same where the rigs do not tell it."""
+        # of one liquid Re grows with h √h and Bo with h²
+        reynolds = self.time**3 if math.isnan(self.reynolds) else self.reynolds
+        return scaling_error(reynolds, self.time**4 if math.isnan(self.bond) else self.bond)
+
 
 def tank_facts(rig: Rig) -> dict[str, float | None]:
     """Return what a model must remember of the tank that it is trained on.
@@ -148,7 +156,8 @@ def scaled_to(model: ReducedOrderModel, factors: TankScaling) -> ReducedOrderMod
         old.output_offset * factors.force,
         old.output_scale * factors.force,
     )
-    facts = {**model.facts, "scaled": {**vars(factors), "hypotheses": list(HYPOTHESES)}}
+    scaled = {**vars(factors), "hypotheses": list(HYPOTHESES), "error": vars(factors.error)}
+    facts = {**model.facts, "scaled": scaled}
     memory = model.agitation and model.agitation.scaled(time=factors.time, velocity=factors.velocity)
     return replace(
         model,

@@ -7,6 +7,7 @@ samples of another length, and nothing is resampled.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import astuple, fields
 from itertools import pairwise
@@ -220,6 +221,7 @@ def description_of(term: Term) -> list[str]:
     if max(abs(height - 1), abs(mass - 1)) > 1e-9:
         lines.append(
             f"scaled to this tank (2.33–2.35): times × {height**0.5:.4g}, velocities × {height**0.5:.4g}, "
-            f"forces × {mass:.4g}; supposing that {'; '.join(HYPOTHESES)}"
+            f"forces × {mass:.4g}; supposing that {'; '.join(HYPOTHESES)}; "
+            f"{TankScaling(height**0.5, height**0.5, mass, math.nan, math.nan).error}, for the same liquid"
         )
     return lines

@@ -173,7 +173,7 @@ def size_change(results: Results, points: Sequence[Point], size: float) -> SizeC
 
 
 def left_out_shares(results: Results, points: Sequence[Point]) -> tuple[float, float]:
-    """Work in wall layers and in making surface over W̄ in the training tank, rms over points.
+    """Work in wall layers and in making surface in the training tank, as shares of W̄, both summed over the points.
 
     Parameters
     ----------
@@ -181,9 +181,8 @@ def left_out_shares(results: Results, points: Sequence[Point]) -> tuple[float, f
     points : sequence of Point
     """
     found = [measured(results, point, 1.0) for point in points]
-    walls = np.array([one.wall_layers / one.w_bar.value for one in found])
-    tension = np.array([one.surface_tension / one.w_bar.value for one in found])
-    return _rms(walls), _rms(tension)
+    whole = sum(one.w_bar.value for one in found)
+    return sum(one.wall_layers for one in found) / whole, sum(one.surface_tension for one in found) / whole
 
 
 def _rms(values: ArrayLike) -> float:

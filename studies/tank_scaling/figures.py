@@ -18,7 +18,7 @@ from pipelines.report.style import (
     png_bytes,
 )
 from sloshlab.reduced_order_model.model import ReducedOrderModel
-from studies.tank_scaling.campaign import SIZES, Run
+from studies.tank_scaling.campaign import SIZES, SMALL_SIZES, Run
 from studies.tank_scaling.changes import Measured, measured
 from studies.tank_scaling.harmonic_runs import Point
 from studies.tank_scaling.networks import in_band, model_for, simulated, steady_state
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 Results = Mapping[Run, Mapping[str, Any]]
 FloatArray = NDArray[np.float64]
+_PLACE_OF_MODEL: Final = 200.0
 _SHOWN_TIMES: Final = (170.0, 215.0)
 """Over √(h/g): strong motion."""
 
@@ -43,7 +44,7 @@ def sizes_figure(results: Results, points: Sequence[Point], model: ReducedOrderM
         Of `campaign.compute`.
     points : sequence of Point
     model : ReducedOrderModel, optional
-        Of the training tank; its values are drawn at the left.
+        Of the training tank; its values are drawn at the right.
     """
     omegas = sorted({point.omega_bar for point in points})
     with drawing_style():
@@ -75,7 +76,7 @@ _LEVELS: Final = (1.0, 1.5, 3.0, 5.0)
 def _draw_points(
     axes: Axes, results: Results, points: Sequence[Point], name: str, model: ReducedOrderModel | None
 ) -> None:
-    sizes = [size for size in SIZES]
+    sizes = (*SMALL_SIZES, *SIZES)
     for point in points:
         found = [_mean(measured(results, point, size), name) for size in sizes]
         style = _style(point.level_g, _LEVELS)
@@ -84,12 +85,14 @@ def _draw_points(
         if model is not None:
             w_bar, beta = steady_state(model_for(model, 1.0), SimilarTank(1.0), point)
             value = w_bar if name == "w_bar" else beta
-            axes.plot([110.0], [value], mfc="none", mec=style["color"], marker=style["marker"], ls="none", ms=5)
+            axes.plot(
+                [_PLACE_OF_MODEL], [value], mfc="none", mec=style["color"], marker=style["marker"], ls="none", ms=5
+            )
     axes.set_xscale("log")
     axes.axvline(1.0, color=NEUTRAL_COLOUR, lw=0.6, ls=":")
-    ticks = {0.04: "1/25", 1.0: "1", 2.0: "2", 5.0: "5", 25.0: "25"}
+    ticks = {0.04: "1/25", 0.2: "1/5", 1.0: "1", 5.0: "5", 25.0: "25"}
     if model is not None:
-        ticks[110.0] = "model"
+        ticks[_PLACE_OF_MODEL] = "model"
     axes.set_xticks(list(ticks), list(ticks.values()))
     axes.minorticks_off()
 
@@ -122,7 +125,7 @@ def motion_figure(results: Results, model: ReducedOrderModel, sizes: Sequence[fl
             own = simulated(model_for(model, size), tank, times)
             shown = (times >= _SHOWN_TIMES[0]) & (times <= _SHOWN_TIMES[1])
             for number, force in enumerate(computed):
-                label = "computed, two seeds" if number == 0 else None
+                label = "computed" if number == 0 else None
                 one.plot(times[shown], force[shown], color="0.55", lw=0.9, label=label)
             one.plot(
                 times[shown],

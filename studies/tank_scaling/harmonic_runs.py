@@ -50,6 +50,11 @@ class Point:
         """Amplitude of v̄ = v/√(gh)."""
         return self.level_g / self.omega_bar
 
+    @property
+    def u_bar(self) -> float:
+        """ū = u₀/h, amplitude of the displacement."""
+        return self.level_g / self.omega_bar**2
+
 
 POINTS: Final = (Point(3.8, 1.0), *(Point(omega, level) for omega in (2.7, 3.8, 5.7) for level in (1.5, 3.0, 5.0)))
 """ω̄ of flutter of the source's flying wing (2.6, 2.7 and 5.7) and where W̄ is largest (3.8)."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
+from acquisition.virtual_laboratory.shaker import STROKE_LIMIT_M
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.reduced_order_model.model import ReducedOrderModel
 from sloshlab.reduced_order_model.tank_scaling import TankScaling, scaled_to
@@ -25,12 +26,14 @@ from studies.tank_scaling.similarity import (
     WATER,
     SimilarTank,
 )
-from studies.tank_scaling.varied_motion import SAMPLES_PER_TIME_SCALE, VariedRun, velocity_and_acceleration
+from studies.tank_scaling.varied_motion import SAMPLES_PER_TIME_SCALE, VariedRun, u_bar, velocity_and_acceleration
 
 FloatArray = NDArray[np.float64]
 
 BAND_OMEGA_BAR: Final = 10.0
 """Of the comparison in time: beyond the motion's frequencies, below the splashes, which no motion decides."""
+LARGEST_U_BAR: Final = STROKE_LIMIT_M / TRAINING_TANK.height_m
+"""Beyond the stroke of the shaker no model was trained."""
 _STEADY_CYCLES: Final = 20
 
 
@@ -38,17 +41,19 @@ _STEADY_CYCLES: Final = 20
 class ModelError:
     """A scaled model beside the computed force of a tank of that size.
 
+    Only motion within the stroke of the shaker that the model was trained on counts.
+
     Attributes
     ----------
     size : float
     force_rms : float
         Of model − computed over the rms of the computed force, in the varied motion, up to `BAND_OMEGA_BAR`.
     other_seed_rms : float
-        The same of another computation of the same motion: what the motion does not decide.
+        The same of another computation of the motion: what the motion does not decide; NaN where there is none.
     energy : float
         Energy of the whole varied motion, model over computed, less one.
     w_bar_rms, beta_rms : float
-        Root mean square of model − computed over the points: of W̄ in shares of the computed one, of β.
+        Root mean square of model − computed over the points: of W̄ over the rms of the computed one, of β.
     """
 
     size: float
@@ -107,7 +112,7 @@ def model_errors(
         Of `campaign.compute`.
     points : sequence of Point
     sizes : sequence of float
-        With varied motion of two seeds each.
+        With varied motion of one seed at least.
     """
     return [_of_size(model_for(model, size), results, points, size) for size in sizes]
 
@@ -124,18 +129,20 @@ def _of_size(
     times = np.arange(min(force.size for force in computed)) / SAMPLES_PER_TIME_SCALE
     computed = [force[: times.size] for force in computed]
     own = simulated(model, tank, times)
-    known = np.isfinite(own)
-    own, computed = own[known], [force[known] for force in computed]
+    own_of_band = in_band(np.nan_to_num(own))
+    known = np.isfinite(own) & (u_bar(times) <= LARGEST_U_BAR)
+    of_band, own_of_band = [in_band(force)[known] for force in computed], own_of_band[known]
     velocity = velocity_and_acceleration(times)[0][known]
-    of_band, own_of_band = [in_band(force) for force in computed], in_band(own)
     size_of_force = _rms(np.concatenate(of_band))
-    steady = [(measured(results, point, size), steady_state(model, tank, point)) for point in points]
+    within = [point for point in points if point.u_bar <= LARGEST_U_BAR]
+    steady = [(measured(results, point, size), steady_state(model, tank, point)) for point in within]
     return ModelError(
         size,
         _rms(np.concatenate([own_of_band - force for force in of_band])) / size_of_force,
-        _rms(of_band[0] - of_band[1]) / size_of_force,
-        float(own @ velocity / np.mean([force @ velocity for force in computed])) - 1,
-        _rms(np.array([w_bar / found.w_bar.value - 1 for found, (w_bar, _) in steady])),
+        _rms(of_band[0] - of_band[1]) / size_of_force if len(of_band) > 1 else math.nan,
+        float(own[known] @ velocity / np.mean([force[known] @ velocity for force in computed])) - 1,
+        _rms(np.array([w_bar - found.w_bar.value for found, (w_bar, _) in steady]))
+        / _rms(np.array([found.w_bar.value for found, _ in steady])),
         _rms(np.array([beta - found.beta.value for found, (_, beta) in steady])),
     )
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from studies.tank_scaling.campaign import LAYERS, RESOLUTION_LAYERS, RESOLUTION_POINT, RESOLUTION_SIZES, Run
+from studies.tank_scaling.campaign import LAYERS, RESOLUTION, RESOLUTION_POINT, Run
 from studies.tank_scaling.changes import Mean, left_out_shares, measured, size_change
 from studies.tank_scaling.harmonic_runs import Point
 from studies.tank_scaling.networks import ModelError
@@ -77,10 +78,9 @@ def resolution_table(results: Results) -> Iterator[str]:
     """
     yield "| spacing | λ | W̄ | β |"
     yield "|---|---|---|---|"
-    for layers in (LAYERS, *RESOLUTION_LAYERS):
-        for size in RESOLUTION_SIZES:
-            found = measured(results, RESOLUTION_POINT, size, layers)
-            yield f"| h/{layers} | {size:g} | " + _row([found.w_bar], 2)[:-1] + "| " + _row([found.beta], 3)
+    for layers, size in ((LAYERS, 1.0), (LAYERS, 25.0), *RESOLUTION):
+        found = measured(results, RESOLUTION_POINT, size, layers)
+        yield f"| h/{layers} | {size:g} | " + _row([found.w_bar], 2)[:-1] + "| " + _row([found.beta], 3)
 
 
 def left_out_table(results: Results, points: Sequence[Point]) -> Iterator[str]:
@@ -101,7 +101,7 @@ def left_out_table(results: Results, points: Sequence[Point]) -> Iterator[str]:
             + " | ".join(f"{100 * s:.1f} %" for s in shares)
             + " |"
         )
-    yield "| rms | " + " | ".join(f"{100 * s:.1f} %" for s in left_out_shares(results, points)) + " |"
+    yield "| of the sums | " + " | ".join(f"{100 * s:.1f} %" for s in left_out_shares(results, points)) + " |"
 
 
 def model_table(errors: Sequence[ModelError]) -> Iterator[str]:
@@ -111,13 +111,17 @@ def model_table(errors: Sequence[ModelError]) -> Iterator[str]:
     ----------
     errors : sequence of ModelError
     """
-    yield "| λ | W̄ at the points, rms | β, rms | force in the varied motion | of another seed | its energy |"
+    yield "| λ | W̄ at the points, rms | β, rms | force in the varied motion | of another seed | energy |"
     yield "|---|---|---|---|---|---|"
     for one in errors:
         yield _minus(
             f"| {one.size:g} | {100 * one.w_bar_rms:.1f} % | {one.beta_rms:.3f} | {100 * one.force_rms:.1f} % |"
-            f" {100 * one.other_seed_rms:.1f} % | {100 * one.energy:+.1f} % |"
+            f" {_percent(one.other_seed_rms)} | {100 * one.energy:+.1f} % |"
         )
+
+
+def _percent(share: float) -> str:
+    return "–" if math.isnan(share) else f"{100 * share:.1f} %"
 
 
 def _row(means: Sequence[Mean], digits: int) -> str:

@@ -25,6 +25,8 @@ SAMPLES_PER_TIME_SCALE: Final = 20.0
 """Of the sampling rate times √(h/g): 380 Hz in the training tank, nine times the largest frequency."""
 OMEGA_BAR: Final = (2.3, 5.9)
 LEVEL_G: Final = (0.5, 5.0)
+_OMEGA_SWING: Final = (OMEGA_BAR[1] - OMEGA_BAR[0]) / 2
+_LEVEL_SWING: Final = (LEVEL_G[1] - LEVEL_G[0]) / 2
 _OMEGA_PERIOD: Final = DURATION / 5
 _LEVEL_PERIOD: Final = DURATION / 3.5
 
@@ -44,19 +46,35 @@ def velocity_and_acceleration(times: ArrayLike) -> tuple[FloatArray, FloatArray]
     ([0.0, 0.0], [0.0, 0.5])
     """
     t = np.maximum(np.asarray(times, np.float64), 0.0)
-    middle, half = sum(OMEGA_BAR) / 2, (OMEGA_BAR[1] - OMEGA_BAR[0]) / 2
     of_omega, of_level = 2 * math.pi / _OMEGA_PERIOD, 2 * math.pi / _LEVEL_PERIOD
-    omega = middle + half * np.sin(of_omega * t)
-    omega_rate = half * of_omega * np.cos(of_omega * t)
-    phase = middle * t + half / of_omega * (1 - np.cos(of_omega * t))
-    swing = (LEVEL_G[1] - LEVEL_G[0]) / 2
-    level = sum(LEVEL_G) / 2 - swing * np.cos(of_level * t)
+    omega, level = _frequency_and_level(t)
+    omega_rate = _OMEGA_SWING * of_omega * np.cos(of_omega * t)
+    phase = sum(OMEGA_BAR) / 2 * t + _OMEGA_SWING / of_omega * (1 - np.cos(of_omega * t))
     amplitude = level / omega
-    amplitude_rate = swing * of_level * np.sin(of_level * t) / omega - level * omega_rate / omega**2
+    level_rate = _LEVEL_SWING * of_level * np.sin(of_level * t)
+    amplitude_rate = level_rate / omega - level * omega_rate / omega**2
     moves = np.asarray(times, np.float64) >= 0
     velocity = np.where(moves, amplitude * np.sin(phase), 0.0)
     acceleration = amplitude_rate * np.sin(phase) + amplitude * omega * np.cos(phase)
     return velocity, np.where(moves, acceleration, 0.0)
+
+
+def u_bar(times: ArrayLike) -> FloatArray:
+    """ū = a/ω̄², amplitude of the displacement over h, but for small terms of its change.
+
+    Parameters
+    ----------
+    times : array_like
+        Over √(h/g), from 0 on.
+    """
+    omega, level = _frequency_and_level(np.asarray(times, np.float64))
+    return level / omega**2
+
+
+def _frequency_and_level(times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """ω̄ and a."""
+    omega = sum(OMEGA_BAR) / 2 + _OMEGA_SWING * np.sin(2 * math.pi / _OMEGA_PERIOD * times)
+    return omega, sum(LEVEL_G) / 2 - _LEVEL_SWING * np.cos(2 * math.pi / _LEVEL_PERIOD * times)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,8 @@
 
 import json
 import math
+from dataclasses import asdict
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,12 +19,13 @@ from sloshlab.reduced_order_model.regressors import Delays
 from sloshlab.reduced_order_model.tank_scaling import TankScaling, tank_facts
 from studies.tank_scaling import campaign, varied_motion
 from studies.tank_scaling.changes import Mean, left_out_shares, measured, size_change
-from studies.tank_scaling.harmonic_runs import HarmonicRun, Point, cycles_of, shaken
+from studies.tank_scaling.harmonic_runs import POINTS, HarmonicRun, Point, cycles_of, shaken
 from studies.tank_scaling.networks import model_for, rig_of_size, simulated, steady_state
 from studies.tank_scaling.similarity import TRAINING_TANK, SimilarTank
 from studies.tank_scaling.uncomputed import Look, seen_in, work_left_out
 
 LAYERS = 8
+KEPT = Path(__file__).resolve().parents[3] / "raw_data" / "tank_scaling"
 POINT = Point(3.8, 3.0)
 
 
@@ -166,9 +169,8 @@ def test_changes_by_hand() -> None:
     assert found.work_noise == pytest.approx(math.sqrt(2) * 0.1 * math.sqrt((1.3**2 + 0.9**2) / 2))
     assert (found.beta_mean, found.beta_rms) == pytest.approx((0.05, math.sqrt(0.01 / 2)))
     assert found.beta_noise == pytest.approx(math.sqrt(2) * 0.1)
-    walls, tension = left_out_shares(runs, others)
-    assert walls == pytest.approx(0.03 * math.sqrt((1 + 0.25) / 2))
-    assert tension == pytest.approx(0.1 * math.sqrt((1 + 0.25) / 2))
+    # 0.03 and 0.1 at each of two points, of W̄ = 1 and 2
+    assert left_out_shares(runs, others) == pytest.approx((0.06 / 3, 0.2 / 3))
     with pytest.raises(InputError, match="make tank-scaling"):
         measured(runs, POINT, 7.0)
     with pytest.raises(InputError, match="blocks"):
@@ -198,12 +200,30 @@ def test_a_campaign_goes_on_where_it_stopped(tmp_path, monkeypatch) -> None:
 def test_a_campaign_asks_all_sizes_the_same() -> None:
     found = campaign.runs()
     assert len({run.name for run in found}) == len(found)
-    of_size = {
-        size: {(run.point, run.seed) for run in found if isinstance(run, HarmonicRun) and run.tank.size == size}
-        for size in campaign.SIZES
-    }
-    assert len(of_size[1.0]) >= 8 * len(campaign.SEEDS)
-    assert all(points == of_size[1.0] for points in of_size.values())
+    asked = [
+        {
+            run.point
+            for run in found
+            if isinstance(run, HarmonicRun) and (run.tank.size, run.layers_per_height) == (size, campaign.LAYERS)
+        }
+        for size in (*campaign.SMALL_SIZES, *campaign.SIZES)
+    ]
+    assert len(asked[0]) >= 8
+    assert all(points == asked[0] for points in asked)
+
+
+def test_what_is_kept_gives_the_kept_law() -> None:
+    """Cycles of every harmonic run are there, and the changes with size follow from them."""
+    kept = campaign.results_of_cycles(json.loads((KEPT / "cycles.json").read_text()))
+    assert list(kept) == [run for run in campaign.runs() if isinstance(run, HarmonicRun)]
+    law = json.loads((KEPT / "law.json").read_text())
+    for entry in law["sizes"]:
+        assert asdict(size_change(kept, POINTS, entry["size"])) == pytest.approx(entry, rel=1e-12)
+    assert left_out_shares(kept, POINTS) == pytest.approx((law["wall_layers"], law["surface_tension"]), rel=1e-12)
+    # by hand, without blocks: 24 cycles of one seed are four blocks of six, so the mean is that of all cycles
+    name = HarmonicRun(POINT, SimilarTank(25.0), campaign.LAYERS, campaign.SEED).name
+    cycles = json.loads((KEPT / "cycles.json").read_text())[name]["w_bar"]
+    assert measured(kept, POINT, 25.0).w_bar.value == pytest.approx(sum(cycles) / len(cycles), rel=1e-12)
 
 
 @pytest.fixture
