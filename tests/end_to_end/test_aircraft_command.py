@@ -49,21 +49,20 @@ def model_of(repository: Path, tmp_path: Path) -> object:
     return made
 
 
-def damper(seed: int, tmp_path: Path) -> ReducedOrderModel:
-    """f = −c v in the units of its tank, by two neurons far apart: the share of each is linear in the velocity."""
+def damper(seed: int) -> ReducedOrderModel:
+    """Δf against the velocity: two neurons whose shares slope with it; the more the larger the number."""
     delays = Delays.tapped(2)
     domain = ValidityDomain.of([MotionCycles(np.zeros(90), np.linspace(4.6, 20.0, 90), np.tile([1e-5, 2.0], 45))])
     facts = {"fill_level": 0.5, "tank_height_m": 0.0272, "liquid_mass_kg": 0.1243, "domain": domain.facts()}
-    far, weight = 1e4, (1.0 + 0.1 * seed) * 1.5
-    # σ(2 far·(v₁+v₂)) of centres ±(far, far)/… is ½ + far (v₁ + v₂): a slope that the weights scale
-    centres = np.array([[1e-4 * far, 0.0], [-1e-4 * far, 0.0]])
-    theta = np.concatenate([centres.ravel(), [-weight, weight]])
+    weight = (1.0 + 0.1 * seed) * 1.5
+    # of centres ±1 the normalised output is −w tanh(2v) of the last velocity
+    theta = np.array([1.0, 0.0, -1.0, 0.0, -weight, weight])
     return ReducedOrderModel(NormalisedRadialBasis(2, 2), theta, delays, Scaling(), 512.0, facts)
 
 
 @pytest.fixture
 def rom(tmp_path: Path) -> Path:
-    save_model(damper(0, tmp_path), tmp_path / "rom.nc")
+    save_model(damper(0), tmp_path / "rom.nc")
     return tmp_path / "rom.nc"
 
 
@@ -75,7 +74,7 @@ def test_four_models_beyond_flutter(
     model_of: object, rom: Path, cache: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Frozen and sideways liquids diverge; a force against the tank's velocity holds the flutter back."""
-    members = tuple(damper(seed, tmp_path) for seed in (1, 2))
+    members = tuple(damper(seed) for seed in (1, 2))
     spread = ResidualSpread(0.1, 0.1, (1.0,) * len(PROBABILITIES))
     save_ensemble(Ensemble(members, spread, members[0].facts), tmp_path / "ensemble.nc")
     out = tmp_path / "out"
@@ -109,8 +108,9 @@ def test_four_models_beyond_flutter(
         assert float(abs(first["sloshing_force"].sel(model="frozen")).max()) == 0.0
         force = first["sloshing_force"].sel(model="vertical").values[:, 0]
         assert np.nanmax(abs(force)) > 0.01
-        largest = abs(first["angle_of_attack"]).max("time")
-        assert float(largest.sel(model="frozen")) > 2 * float(largest.sel(model="vertical"))
+        # a hundredth more of damping at 29 rad/s over 1.5 s is a factor of 1.5
+        later = abs(first["angle_of_attack"]).sel(time=slice(1.5, 2.0)).max("time")
+        assert float(later.sel(model="frozen")) > 1.3 * float(later.sel(model="vertical"))
     assert {"stability.nc", "response.nc", "report.html"} <= {path.name for path in out.iterdir()}
     figures = {path.stem for path in (out / "figures").iterdir()}
     assert {"layout", "root_loci", "models", "mode_shapes"} <= figures
