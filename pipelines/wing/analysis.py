@@ -31,7 +31,7 @@ from sloshlab.aircraft.linear_sloshing import DAMPER_CHOICES, dampers_of_map
 from sloshlab.aircraft.wing_air import air_on_modes, air_on_nodes
 from sloshlab.aircraft.wing_calibration import WingState, calibrated, wing_state
 from sloshlab.aircraft.wing_file import WingDescription, load_wing
-from sloshlab.errors import InputError
+from sloshlab.errors import AnalysisError, InputError
 from sloshlab.maps.map_readings import mean_along_acceleration
 from sloshlab.twin.measured_maps import read_maps
 
@@ -95,15 +95,8 @@ class _Pipeline:
         fractions = tuple(value for value in (BETA_HAT, -BETA_HAT, *beta) if np.isfinite(value))
         effective = flutter_with_effective_mass(state, fractions)
         gusts = tuple(gust_case(state, tanks, settings, gust, advance) for gust in GUSTS)
-        dampers = None
-        damping: dict[str, dict[str, float]] = {}
-        if self.maps is not None and state.flutter is not None:
-            omega = state.flutter.frequency_rad_per_s
-            damping = {
-                choice: dampers_of_map(state.model, self.maps["w_bar"], choice, frequency_rad_per_s=omega)
-                for choice in DAMPER_CHOICES
-            }
-            dampers = damper_case(state, gusts[_DAMPER_CASE], damping, settings, advance)
+        damping, notes = self.dampers(state)
+        dampers = damper_case(state, gusts[_DAMPER_CASE], damping, settings, advance) if damping else None
         landing = None
         if described.landing is not None and landing_air is not None:
             air = air_on_modes(landing_air, state.model.structure, described.aerodynamics)
@@ -119,7 +112,21 @@ class _Pipeline:
             dampers=dampers,
             damping_n_s_per_m=damping,
             landing=landing,
+            notes=notes,
         )
+
+    def dampers(self, state: WingState) -> tuple[dict[str, dict[str, float]], tuple[str, ...]]:
+        """c of every tank by the choices of (E.8), or why the map does not tell them."""
+        if self.maps is None or state.flutter is None:
+            return {}, ()
+        omega, w_bar = state.flutter.frequency_rad_per_s, self.maps["w_bar"]
+        try:
+            return {
+                choice: dampers_of_map(state.model, w_bar, choice, frequency_rad_per_s=omega)
+                for choice in DAMPER_CHOICES
+            }, ()
+        except AnalysisError as error:
+            return {}, (f"no dampers: {error}",)
 
     def matched(self, start: WingState, nodes: GeneralisedForces, fold_m_per_s: float) -> tuple[WingState, float]:
         """The wing whose tanks take as much in the map as the air gives at a speed, calibrated; and its share.

@@ -233,6 +233,8 @@ class WingResult:
     damping_n_s_per_m : mapping
         c of each tank by the choice, as of (E.8).
     landing : GustCase or None
+    notes : tuple of str
+        What could not be computed, and why.
     """
 
     state: WingState
@@ -245,6 +247,7 @@ class WingResult:
     dampers: GustCase | None = None
     damping_n_s_per_m: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     landing: GustCase | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def cases(self) -> tuple[GustCase, ...]:
@@ -265,7 +268,7 @@ class WingResult:
         """What must be read before the results; that tanks move less than any training is told in a table."""
         targets = self.state.described.calibration
         found = [] if targets is None else self.state.misses(targets)
-        found += list(self.stability.flags)
+        found += [*self.stability.flags, *self.notes]
         found += [f"{name}: {one}" for name, one in self.departures if _matters(one)]
         found += self.bifurcation.flags
         found += [

@@ -53,6 +53,8 @@ width_m = 0.5
 height_m = 0.3
 """
 
+SHORT = ["--speeds", "2", "--duration", "2", "--patience", "10"]
+
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -78,7 +80,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.skipif(find_spec("panelaero") is None, reason="needs PanelAero")
 def test_a_small_wing_gives_all_results(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["wing", "wing.toml", "--rom", "ROM.nc", "--maps", "maps.nc", "-o", "OUT", "--json"]
-    code = run([*arguments, "--speeds", "2", "--duration", "2", "--patience", "10"])
+    code = run([*arguments, *SHORT, "--no-report"])
     # a network without a domain of validity is flagged
     assert code == 3
     summary = json.loads(capsys.readouterr().out.splitlines()[-1])
@@ -86,6 +88,8 @@ def test_a_small_wing_gives_all_results(folder: Path, capsys: pytest.CaptureFixt
     assert any("does not tell where it was trained" in flag for flag in summary["flags"])
     # the stiffness was not solved for the targets, and that is said
     assert any(flag.startswith("calibration") for flag in summary["flags"])
+    # the tank flutters faster than any map was measured
+    assert any("no dampers: w_bar at omega_bar" in flag for flag in summary["flags"])
     with xr.open_dataset(folder / "OUT" / "stability.nc") as stability:
         assert stability.sizes["fill_level"] == 11
         half = float(stability["fill_flutter_speed"].sel(fill_level=0.5))
@@ -97,7 +101,16 @@ def test_a_small_wing_gives_all_results(folder: Path, capsys: pytest.CaptureFixt
         assert float(np.abs(response["tip_acceleration"].sel(model="frozen")).max()) > 0.1
     with xr.open_dataset(folder / "OUT" / "bifurcation.nc") as bifurcation:
         assert bifurcation["cycle_amplitude"].shape == (3, 2)
+    assert not (folder / "OUT" / "report.html").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(find_spec("panelaero") is None, reason="needs PanelAero")
+def test_the_report_draws_every_figure_of_a_small_wing(folder: Path) -> None:
+    assert run(["wing", "wing.toml", "--rom", "ROM.nc", "--maps", "maps.nc", "-o", "OUT", *SHORT]) == 3
     assert "asked and reached" in (folder / "OUT" / "report.html").read_text(encoding="utf-8")
+    drawn = {path.stem for path in (folder / "OUT" / "figures").iterdir()}
+    assert {"layout", "root_locus", "fill_level", "gust_1", "two_gusts", "bifurcation", "energy"} <= drawn
 
 
 def test_bad_input_is_one_line(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
