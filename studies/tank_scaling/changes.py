@@ -20,7 +20,7 @@ from studies.tank_scaling.harmonic_runs import HarmonicRun, Point
 from studies.tank_scaling.similarity import SimilarTank
 
 BLOCK_CYCLES: Final = 6
-"""Longer than the memory of the liquid, a few cycles."""
+"""At least; longer than the memory of the liquid, a few cycles."""
 
 
 @dataclass(frozen=True)
@@ -54,12 +54,15 @@ class Mean:
         >>> Mean.of([[1.0] * 6 + [3.0] * 6])
         Mean(value=2.0, error=1.0)
         """
+        runs = [np.asarray(run, float) for run in cycles]
+        # every cycle belongs to a block; one that is cut off at the end of a run leaves a block shorter by one
         blocks = [
             block.mean()
-            for run in cycles
-            for block in np.split(np.asarray(run, float), range(BLOCK_CYCLES, len(np.asarray(run)), BLOCK_CYCLES))
-            if block.size == BLOCK_CYCLES
+            for run in runs
+            if run.size >= BLOCK_CYCLES
+            for block in np.array_split(run, run.size // BLOCK_CYCLES)
         ]
+        value = float(np.concatenate(runs).mean()) if runs else math.nan
         if len(blocks) < 2:
             raise InputError(
                 "cycles",
@@ -67,7 +70,7 @@ class Mean:
                 allowed="2 and more",
                 remedy="compute more",
             )
-        return cls(float(np.mean(blocks)), float(np.std(blocks, ddof=1) / math.sqrt(len(blocks))))
+        return cls(value, float(np.std(blocks, ddof=1) / math.sqrt(len(blocks))))
 
 
 @dataclass(frozen=True)

@@ -100,7 +100,7 @@ class HarmonicCycles:
     Attributes
     ----------
     w_bar, beta : ndarray, shape (n_cycles,)
-        Of every cycle after the waiting.
+        Of every whole cycle after the waiting; the last one is not whole where the last step was rounded down.
     left_out : LeftOut
         Estimates of the work per cycle that the computation does not contain, over m_l (Ω u₀)².
     """

@@ -220,10 +220,15 @@ def test_what_is_kept_gives_the_kept_law() -> None:
     for entry in law["sizes"]:
         assert asdict(size_change(kept, POINTS, entry["size"])) == pytest.approx(entry, rel=1e-12)
     assert left_out_shares(kept, POINTS) == pytest.approx((law["wall_layers"], law["surface_tension"]), rel=1e-12)
-    # by hand, without blocks: 24 cycles of one seed are four blocks of six, so the mean is that of all cycles
+    # by hand: the mean is that of all cycles, its error that of three blocks of 23 cycles
     name = HarmonicRun(POINT, SimilarTank(25.0), campaign.LAYERS, campaign.SEED).name
     cycles = json.loads((KEPT / "cycles.json").read_text())[name]["w_bar"]
-    assert measured(kept, POINT, 25.0).w_bar.value == pytest.approx(sum(cycles) / len(cycles), rel=1e-12)
+    found = measured(kept, POINT, 25.0).w_bar
+    assert found.value == pytest.approx(sum(cycles) / len(cycles), rel=1e-12)
+    blocks = [sum(cycles[:8]) / 8, sum(cycles[8:16]) / 8, sum(cycles[16:]) / 7]
+    mean = sum(blocks) / 3
+    assert len(cycles) == 23
+    assert found.error == pytest.approx(math.sqrt(sum((block - mean) ** 2 for block in blocks) / 6), rel=1e-9)
 
 
 @pytest.fixture
