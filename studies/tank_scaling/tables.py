@@ -46,7 +46,8 @@ def point_table(results: Results, points: Sequence[Point], sizes: Sequence[float
     for point in points:
         found = [measured(results, point, size) for size in sizes]
         yield f"| {point.omega_bar:g}, {point.level_g:g} g | W̄ | " + _row([one.w_bar for one in found], 2)
-        yield "| … | β | " + _row([one.beta for one in found], 3)
+        # narrower, for lines of the page must not grow beyond 120 characters
+        yield "| … | β | " + _row([one.beta for one in found], 3).replace(" ± ", "±")
 
 
 def change_table(results: Results, points: Sequence[Point], sizes: Sequence[float]) -> Iterator[str]:
