@@ -115,7 +115,7 @@ plt.show()
 # %%
 # A little beyond flutter the liquid damps more than the air feeds.
 # Farther on, motion grows until the liquid, shaken by more than 1 g, takes what the air gives: a limit cycle.
-# Still farther it cannot take that much at any amplitude.
+# Still farther the motion grows on, past everything that the network was trained on.
 for share, response in free.items():
     in_g = abs(response.tank_acceleration_m_per_s2[response.time_s > response.time_s[-1] - 2, 0]).max() / 9.81
     print(f"{100 * share - 100:.0f} % beyond: {in_g:.3f} g at the end", response.ending)

@@ -221,7 +221,10 @@ def description_of(term: Term) -> list[str]:
     if max(abs(height - 1), abs(mass - 1)) > 1e-9:
         lines.append(
             f"scaled to this tank (2.33–2.35): times × {height**0.5:.4g}, velocities × {height**0.5:.4g}, "
-            f"forces × {mass:.4g}; supposing that {'; '.join(HYPOTHESES)}; "
-            f"{TankScaling(height**0.5, height**0.5, mass, math.nan, math.nan).error}, for the same liquid"
+            f"forces × {mass:.4g}; supposing that {'; '.join(HYPOTHESES)}"
         )
+    # of another liquid in the same tank nothing is known here but its mass
+    if abs(height - 1) > 1e-9:
+        error = TankScaling(height**0.5, height**0.5, mass, math.nan, math.nan).error
+        lines.append(f"{error}, for the same liquid")
     return lines

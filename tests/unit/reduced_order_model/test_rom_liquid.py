@@ -11,6 +11,7 @@ from sloshlab.reduced_order_model.liquid_signals import liquid_signals
 from sloshlab.reduced_order_model.model import ReducedOrderModel, Scaling
 from sloshlab.reduced_order_model.networks.radial_basis import NormalisedRadialBasis
 from sloshlab.reduced_order_model.regressors import Delays
+from sloshlab.reduced_order_model.scaling_error import scaling_error
 from sloshlab.reduced_order_model.tank_scaling import HYPOTHESES, TankScaling, scaled_to
 from sloshlab.rig import Rig
 
@@ -111,3 +112,5 @@ def test_a_scaled_model_dissipates_the_same_share():
         found.append(power * 2 * math.pi / omega / (tank.liquid_mass_kg * speed**2))
     assert found[1] == pytest.approx(found[0], rel=1e-9)
     assert scaled.facts["scaled"]["hypotheses"] == list(HYPOTHESES)
+    # Re × 8 and Bo × 16: of one liquid, four times as high
+    assert scaled.facts["scaled"]["error"] == vars(scaling_error(8.0, 16.0))

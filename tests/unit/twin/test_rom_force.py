@@ -16,6 +16,7 @@ from sloshlab.reduced_order_model.networks.multilayer import Multilayer
 from sloshlab.reduced_order_model.networks.network import Network
 from sloshlab.reduced_order_model.networks.radial_basis import NormalisedRadialBasis, RadialBasis
 from sloshlab.reduced_order_model.regressors import Delays
+from sloshlab.reduced_order_model.scaling_error import scaling_error
 from sloshlab.reduced_order_model.storage import save_model
 from sloshlab.rig import Rig
 from sloshlab.twin.excitation import free, harmonic, recorded
@@ -160,6 +161,9 @@ def test_another_tank_and_liquid_answer_in_similarity(name: str) -> None:
     stated = description_of(term_of(model, other))[1]
     assert "times × 2, velocities × 2, forces × 3.2" in stated
     assert "both tanks are filled to the same level" in stated
+    # of the same liquid in a tank four times as high: Re × 8, Bo × 16
+    assert description_of(term_of(model, other))[2] == f"{scaling_error(8.0, 16.0)}, for the same liquid"
+    assert len(description_of(term_of(model, rig(density=800.0)))) == 2
 
 
 def test_a_saved_twin_needs_no_model_file_and_gives_the_same_bytes(tmp_path: Path) -> None:
