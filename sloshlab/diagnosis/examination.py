@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sloshlab.diagnosis.block_cut import block_cut
 from sloshlab.diagnosis.findings import Findings
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
-from sloshlab.identification.diagnosed_model import DiagnosedModel
+from sloshlab.identification.diagnosed_model import DiagnosedModel, ModelOfBlocks
 from sloshlab.identification.mismatch import mismatches, summary
 from sloshlab.missing_force.force_character import Answer, ForceCharacter, force_character
 from sloshlab.missing_force.interface_cut import InterfaceCut, interface_cut, own_tolerances
@@ -80,6 +81,8 @@ def examined(found: Findings, seed: int = 0) -> Examination:
     rig = getattr(found.model, "rig", None)
     maps = residual_maps(found.fitting, readings, rig)
     where = summary(mismatches(found.fitting, readings))
+    if isinstance(found.model, ModelOfBlocks):
+        return Examination(block_cut(found.model, found.fitting, values, seed), {}, (), maps, where)
     cut = interface_cut(found.model, found.fitting, values, seed)
     characters = {}
     for place in cut.places:

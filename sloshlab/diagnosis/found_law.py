@@ -20,6 +20,7 @@ from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
 from sloshlab.diagnosis.selection.hidden_effects import hidden_effects
 from sloshlab.diagnosis.selection.model_selection import N_KEPT
 from sloshlab.errors import SloshlabError
+from sloshlab.identification.diagnosed_model import ModelOfBlocks
 from sloshlab.identification.free_run_fit import fitted
 from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.missing_force.latent_force import STRUCTURE, TANK
@@ -89,7 +90,8 @@ def found_law(found: Findings, block: str) -> FoundLaw | None:
         Of what is missing; empty where it is not located, and then structure and tank are tried.
     """
     places = [place for place in (STRUCTURE, TANK) if place in found.model.blocks and block in ("", place)]
-    if not found.split.has_held_out:
+    # a law is a force along one motion, which a twin of several blocks has not
+    if not found.split.has_held_out or isinstance(found.model, ModelOfBlocks):
         return None
     laws = [law for place in places if (law := _law_at(found, place)) is not None]
     return max(laws, key=lambda law: law.model.evidence, default=None)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.signal import hilbert
 
 from sloshlab.channel_names import ACCELERATION_ROOT
-from sloshlab.identification.diagnosed_model import DiagnosedModel
+from sloshlab.identification.diagnosed_model import DiagnosedModel, ModelOfBlocks
 from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.identification.observations import Observation
 from sloshlab.missing_physics.candidate import Surroundings
@@ -73,6 +73,7 @@ def surroundings_of(problem: FreeRunProblem, fit: FreeRunFit, rig: Rig | None) -
         has_one_frequency=max(spreads) * max(frequencies) / min(frequencies) < _ONE_FREQUENCY,
         runs=tuple(run.name for run in model.runs),
         update_rates_hz=_update_rates(fitting, float(np.max(frequencies))),
+        own_effects=model.effects if isinstance(model, ModelOfBlocks) else (),
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.baseline_parameter import BaselineParameter
 from sloshlab.identification.case import CaseRun
-from sloshlab.missing_physics.candidate import Candidate
+from sloshlab.missing_physics.candidate import Candidate, Effect
 from sloshlab.missing_physics.extension import NOTHING, Extension
 from sloshlab.twin.lane_preparation import Executor
 from sloshlab.twin.twin import Twin
 
 FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
 EXACT: Final = 0.01
 """Of a motion and of its numbers, to which a simulation describes a rig: as gains are known. Less is no physics of
 its own."""
@@ -98,3 +99,24 @@ class DiagnosedModel(Protocol):
 
     def save_extended(self, values: Mapping[str, float], candidates: Sequence[Candidate], path: Path) -> None:
         """Write the simulation with retuned numbers and effects."""
+
+
+@runtime_checkable
+class ModelOfBlocks(Protocol):
+    """A model of several blocks that says itself what may be missing in each, and how that shows.
+
+    Attributes
+    ----------
+    effects : tuple of Effect
+        Beside those of sensors.
+    """
+
+    effects: tuple[Effect, ...]
+
+    def block_transfers(
+        self, run: CaseRun, values: Mapping[str, float], frequencies_hz: FloatArray
+    ) -> Mapping[str, ComplexArray]:
+        """Readings of the compared channels per unit of what a place lacks, shape (n_frequencies, n_channels).
+
+        Names of places begin with their block, as ``tank 2``; the unit is that of the place.
+        """

@@ -30,7 +30,7 @@ from sloshlab.identification.rig_parameters import (
     retuned_term,
     rig_parameters,
 )
-from sloshlab.missing_physics.candidate import BLOCKS, Candidate, extension_of
+from sloshlab.missing_physics.candidate import BLOCKS_OF_A_RIG, Candidate, extension_of
 from sloshlab.missing_physics.extension import NOTHING, ActingDrive, Extension, SensorFault, with_acting
 from sloshlab.missing_physics.saved_effects import effect_lines
 from sloshlab.recording import channels, with_values
@@ -126,7 +126,7 @@ class RigModel:
     ) -> None:
         self.rig, self.folder, self.executor = rig, folder, executor
         self._most_kept_bytes = most_kept_bytes
-        self.blocks: tuple[str, ...] = BLOCKS
+        self.blocks: tuple[str, ...] = BLOCKS_OF_A_RIG
         self.twin = Twin.from_rig(rig, folder=folder)
         self.runs = tuple(runs)
         self._drives: dict[tuple[Any, ...], Drive] = {}

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sloshlab.identification.case import CaseRun
-from sloshlab.identification.diagnosed_model import DiagnosedModel, Request
+from sloshlab.identification.diagnosed_model import DiagnosedModel, ModelOfBlocks, Request
 from sloshlab.identification.observations import Observation
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_force.force_inversion import (
@@ -149,6 +149,9 @@ def run_forces(
         for observation in observed
     }
     believed = [observation for observation in observed if observation.channel not in without]
+    if isinstance(model, ModelOfBlocks):
+        # what its blocks lack is no force along one motion
+        return RunForces((), missed, {}, None, 0.0)
     if not isinstance(model, RigModel):
         return _on_probed(model, values, extension, observed, believed, missed)
     simulation = model.whole_simulation(Request(run, values, extension))

@@ -18,7 +18,9 @@ from sloshlab.registry import Registry
 from sloshlab.rig import Rig
 from sloshlab.twin.twin import Twin
 
-BLOCKS: Final = ("excitation", "structure", "tank", "sensor")
+BLOCKS: Final = ("excitation", "structure", "tank", "aerodynamics", "control", "sensor")
+"""Air and control are those of a wing in flight."""
+BLOCKS_OF_A_RIG: Final = ("excitation", "structure", "tank", "sensor")
 MissingForces = Mapping[str, NDArray[np.float64]]
 """Run → force [N] that the baseline lacks at every sample, upward positive."""
 
@@ -62,6 +64,8 @@ class Surroundings:
         Names of the runs that are fitted, each of which may have numbers of its own.
     update_rates_hz : mapping of str to tuple of float
         Channels whose readings change at some instants only, and rates [Hz] of these, the likeliest first.
+    own_effects : tuple of Effect
+        Of a twin that says itself what may be missing, in the place of all known effects but those of sensors.
     """
 
     rig: Rig
@@ -75,7 +79,7 @@ class Surroundings:
     driving: tuple[str, ...]
     sampling_rate_hz: float
     longest_run_s: float
-    blocks: tuple[str, ...] = BLOCKS
+    blocks: tuple[str, ...] = BLOCKS_OF_A_RIG
     peaks: Mapping[str, float] = field(default_factory=dict)
     channel: str = ""
     has_one_frequency: bool = False
@@ -84,6 +88,7 @@ class Surroundings:
     incoherent_with_base: frozenset[str] = frozenset()
     runs: tuple[str, ...] = ()
     update_rates_hz: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    own_effects: tuple[Effect, ...] = ()
 
     @property
     def reading(self) -> float:
@@ -494,7 +499,10 @@ def candidates(surroundings: Surroundings) -> list[Candidate]:
         If an effect cannot say where it starts, or what it adds there.
     """
     found: list[Candidate] = []
-    for effect in known_effects():
+    known = known_effects()
+    if surroundings.own_effects:
+        known = [*surroundings.own_effects, *(effect for effect in known if effect.block == "sensor")]
+    for effect in known:
         # A twin of a user's own has no tank, whatever its module registers.
         if effect.block not in surroundings.blocks:
             continue

@@ -92,6 +92,8 @@ class Extension:
     drives : tuple of ActingDrive
     run_terms : mapping of str to tuple of Term
         Forces that are added in one run alone.
+    numbers : mapping of str to float
+        Numbers of a twin that has the effect itself and believes that it is not there, by their names.
     """
 
     terms: tuple[Term, ...] = ()
@@ -101,6 +103,7 @@ class Extension:
     structure: Callable[[Structure], Structure] | None = None
     drives: tuple[ActingDrive, ...] = ()
     run_terms: Mapping[str, tuple[Term, ...]] = field(default_factory=dict)
+    numbers: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.key:
@@ -109,7 +112,8 @@ class Extension:
             others = [fault.key for fault in self.faults] + [drive.key for drive in self.drives]
             # by the functions themselves, which a cache that keeps the key keeps alive
             changes = [("changes", part) for part in (self.liquid, self.structure) if part is not None]
-            object.__setattr__(self, "key", (*own, *others, *changes))
+            numbers = [("number", *item) for item in sorted(self.numbers.items())]
+            object.__setattr__(self, "key", (*own, *others, *changes, *numbers))
 
     def terms_in(self, run: str) -> tuple[Term, ...]:
         """Forces that are added in a run."""
@@ -128,6 +132,7 @@ class Extension:
                 run: self.run_terms.get(run, ()) + other.run_terms.get(run, ())
                 for run in {**self.run_terms, **other.run_terms}
             },
+            {**self.numbers, **other.numbers},
         )
 
 

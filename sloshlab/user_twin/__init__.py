@@ -1,12 +1,15 @@
 """A user's own twin, given as a Python module that defines ``TWIN``.
 
-Three forms. `EquationTwin` is a function of state, inputs and parameters; `MechanicalTwin` describes masses,
+Four forms. `EquationTwin` is a function of state, inputs and parameters; `MechanicalTwin` describes masses,
 springs, dampers, what drives and what is read. Both run in this package's own engine, which finds every contact
-and every turn of dry friction. `FreeTwin` simulates by itself and adds the force that it is handed.
+and every turn of dry friction. `FreeTwin` simulates by itself and adds the force that it is handed, `BlockTwin` by
+itself with effects of its own.
 """
 
 from sloshlab.user_twin.added_force import AddedForce
+from sloshlab.user_twin.block_model import BlockTwinModel
 from sloshlab.user_twin.description import (
+    BlockTwin,
     Compared,
     EquationTwin,
     FreeTwin,
@@ -24,6 +27,8 @@ from sloshlab.user_twin.model import UserTwinModel
 
 __all__ = [
     "AddedForce",
+    "BlockTwin",
+    "BlockTwinModel",
     "Compared",
     "EquationTwin",
     "FreeTwin",

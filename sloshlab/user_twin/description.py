@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sloshlab.errors import InputError, UnitsError
+from sloshlab.missing_physics.candidate import Effect
 from sloshlab.units import SI_UNITS
 from sloshlab.user_twin.added_force import AddedForce
 from sloshlab.user_twin.mechanism import Mechanism
@@ -226,6 +227,33 @@ class FreeTwin:
     friction_speed_m_per_s: float | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class BlockTwin:
+    """A twin of several blocks that simulates by itself and has what may be missing in each as numbers of its own.
+
+    Attributes
+    ----------
+    parameters, driving, compared
+        As of `MechanicalTwin`.
+    simulate : callable
+        (`TwinRun`, values) → `Response`. Values are those of the parameters and the numbers of effects
+        (`Extension.numbers`); those that are absent are as believed, and the effects not there. It may be called
+        from several threads at once.
+    transfers : callable
+        (`TwinRun`, values, frequencies [Hz]) → readings of the compared channels, in their order, per unit of what
+        a place lacks, shape (n_frequencies, n_channels), by places whose names begin with their block.
+    effects : tuple of Effect
+        What may be missing, beside faults of sensors on compared channels.
+    """
+
+    parameters: Sequence[Parameter]
+    driving: Sequence[str]
+    compared: Mapping[str, Compared | str]
+    simulate: Callable[[TwinRun, Mapping[str, float]], Response]
+    transfers: Callable[[TwinRun, Mapping[str, float], FloatArray], Mapping[str, NDArray[np.complex128]]]
+    effects: tuple[Effect, ...]
+
+
 @dataclass(frozen=True)
 class State:
     """From where a state of equations starts in every run.
@@ -315,7 +343,7 @@ class EquationTwin:
         }
 
 
-UserTwin = MechanicalTwin | FreeTwin | EquationTwin
+UserTwin = MechanicalTwin | FreeTwin | EquationTwin | BlockTwin
 
 
 def require_sound(twin: UserTwin) -> None:

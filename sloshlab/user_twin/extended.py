@@ -44,7 +44,11 @@ def save_extended(
     lines = [f"sloshlab_user_twin = {FORMAT}", f"module = {json.dumps(module)}", "", "[parameters]"]
     # The shortest text that reads back as the same number.
     lines += [f"{json.dumps(name)} = {float(value)!r}" for name, value in baseline.items()]
-    for term in extension_of(candidates, values).terms:
+    added = extension_of(candidates, values)
+    if added.numbers:
+        lines += ["", "[numbers]"]
+        lines += [f"{json.dumps(name)} = {float(value)!r}" for name, value in added.numbers.items()]
+    for term in added.terms:
         lines += ["", "[[terms]]", f"name = {json.dumps(term.name)}"]
         lines += [f"{name} = {float(value)!r}" for name, value in term.values.items()]
         if term.table.size:
@@ -65,6 +69,7 @@ def load_extended(path: str | Path) -> tuple[dict[str, float], Extension]:
     document = _document(file)
     try:
         values = {str(name): _finite(value) for name, value in document["parameters"].items()}
+        numbers = {str(name): _finite(value) for name, value in document.get("numbers", {}).items()}
         described = document.get("terms", [])
         if len(described) > _MOST_TERMS:
             raise ValueError(f"{len(described)} terms")
@@ -73,7 +78,7 @@ def load_extended(path: str | Path) -> tuple[dict[str, float], Extension]:
         raise
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(f"twin {file}", got=f"contents that are no twin ({error})"[:200]) from error
-    return values, Extension(terms) + saved_effects(document, f"twin {file}")
+    return values, Extension(terms, numbers=numbers) + saved_effects(document, f"twin {file}")
 
 
 def _document(file: Path) -> dict[str, Any]:

@@ -178,14 +178,18 @@ class UserTwinModel:
             fault for fault in extension.faults if any(fault.acts_on(name, run.name) for name in driving)
         )
         forces = [part for part in extension.key if part[0] not in {fault.key[0] for fault in extension.faults}]
-        own = self._own(run, request.values)
+        own = self._numbers(request)
         return (run.name, *own.values(), tuple(forces), tuple(fault.key for fault in undone)), undone
 
     def _asked(self, request: Request, undone: tuple[SensorFault, ...]) -> Asked:
         run, extension = request.run, request.extension
         is_changed = undone or extension.drives
         view = _view(run, undone, extension.drives) if is_changed else self._views[run.name]
-        return Asked(view, self._own(run, request.values), extension.terms_in(run.name))
+        return Asked(view, self._numbers(request), extension.terms_in(run.name))
+
+    def _numbers(self, request: Request) -> dict[str, float]:
+        """Of the twin itself, and those that effects give it."""
+        return self._own(request.run, request.values) | dict(request.extension.numbers)
 
     def _own(self, run: CaseRun, values: Mapping[str, float]) -> dict[str, float]:
         """Values of the user's parameters, and of the states that a run starts from, under the user's names."""

@@ -26,7 +26,15 @@ from sloshlab.twin.structure import single_degree_of_freedom
 from sloshlab.twin.terms import Term
 from sloshlab.twin.twin import Twin
 from sloshlab.user_twin.added_force import AddedForce
-from sloshlab.user_twin.description import EquationTwin, FreeTwin, MechanicalTwin, Response, TwinRun, UserTwin
+from sloshlab.user_twin.description import (
+    BlockTwin,
+    EquationTwin,
+    FreeTwin,
+    MechanicalTwin,
+    Response,
+    TwinRun,
+    UserTwin,
+)
 from sloshlab.user_twin.mechanism import EngineTwin, Mechanism, engine_twin, reading_of
 from sloshlab.user_twin.raised_errors import require_no_raise
 
@@ -90,6 +98,8 @@ def simulator_of(twin: UserTwin, name: str, n_runs: int) -> Simulator:
             raise InputError(f"{name}: {error}") from error
     if isinstance(twin, FreeTwin):
         return _OfOwnCode(twin, name)
+    if isinstance(twin, BlockTwin):
+        return _OfBlocks(twin, name)
     return _OfMechanism(twin, name, excitations)
 
 
@@ -488,6 +498,36 @@ class _OfOwnCode(_OneByOne):
             raise InputError(f"{self._name}: {what}", got=f"shape {array.shape}", allowed=f"{shape}")
         _require_finite(array, f"{self._name}: {what}", run.sampling_rate_hz)
         return array
+
+
+class _OfBlocks(_OneByOne):
+    """A simulation of several blocks, whose effects are numbers of its own."""
+
+    def __init__(self, twin: BlockTwin, name: str) -> None:
+        self._twin, self._name = twin, name
+
+    def truth(self, run: TwinRun, own: Mapping[str, float], terms: Sequence[Term]) -> Truth:
+        if terms:
+            names = ", ".join(term.name for term in terms)
+            raise AnalysisError(f"{self._name}: {names}"[:120], got="a force", allowed="an effect of this twin")
+        response = _called(self._twin.simulate, self._name, run, own)
+        truth = {
+            name: np.asarray(response.readings[name], np.float64)
+            for name in self._twin.compared
+            if name in run.channels
+        }
+        for name, values in truth.items():
+            _require_finite(values, f"{self._name}: {run.name}: reading {name}", run.sampling_rate_hz)
+        return truth, np.asarray(response.motion, np.float64)
+
+    def stand_in(self, run: TwinRun, own: Mapping[str, float]) -> Twin:
+        """A mass on a spring of the frequency of the motion."""
+        displacement, _, acceleration = self.truth(run, own, ())[1].std(axis=0)
+        return Twin(single_degree_of_freedom(1.0, max(float(acceleration / max(displacement, 1e-300)), 1e-12)))
+
+    def moving_mass_kg(self, run: TwinRun, own: Mapping[str, float]) -> float:
+        del run, own
+        return 1.0
 
 
 def _require_finite(values: FloatArray, what: str, rate_hz: float) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sloshlab.errors import SloshlabError
-from sloshlab.identification.diagnosed_model import DiagnosedModel
+from sloshlab.identification.diagnosed_model import DiagnosedModel, ModelOfBlocks
 from sloshlab.identification.observations import Observation
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.identification.rig_parameters import retuned_structure
@@ -55,6 +55,12 @@ def transfers_of(
     frequencies_hz : ndarray, optional
         Those of the bands by default.
     """
+    if isinstance(model, ModelOfBlocks):
+        at_hz = run[0].frequencies_hz if frequencies_hz is None else frequencies_hz
+        channels = model.compared(run[0].run)
+        chosen = [channels.index(each.channel) for each in run]
+        found = model.block_transfers(run[0].run, values, at_hz)
+        return {place: transfers[:, chosen] for place, transfers in found.items()}
     if not isinstance(model, RigModel):
         return _probed(model, run, values)
     structure = None if model.twin.structure is None else retuned_structure(model.twin.structure, values)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from sloshlab.diagnosis.inference.places import ELSEWHERE, SENSOR, STRUCTURE, TANK, transfers_of
-from sloshlab.identification.diagnosed_model import EXACT, DiagnosedModel
+from sloshlab.identification.diagnosed_model import EXACT, DiagnosedModel, ModelOfBlocks
 from sloshlab.identification.observations import Observation
 from sloshlab.identification.rig_model import RigModel
 
@@ -87,7 +87,7 @@ def run_noise(model: DiagnosedModel, observed: Sequence[Observation], values: Ma
         parts = np.stack([transfers.real, transfers.imag], axis=-1)
         if parts.any():
             places[place] = _projections(inverse_root @ (parts[None] / noise[..., None]))
-    if not isinstance(model, RigModel) and (n > 1 or STRUCTURE not in places):
+    if not isinstance(model, RigModel | ModelOfBlocks) and (n > 1 or STRUCTURE not in places):
         # A force on another coordinate of a user's own twin shows in any way in all channels.
         places[ELSEWHERE] = _projections(inverse_root)
     for i, each in enumerate(observed):
