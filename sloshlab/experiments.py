@@ -197,6 +197,9 @@ for _experiment in (
         # the guided tank of the source is held 64 mm above its rest
         virtual_defaults={"duration_s": 6.0, "initial_displacement_m": 0.064},
     ),
+    Experiment("flight_gust", "a wing in flight passes gusts", moves="anything"),
+    Experiment("flight_pulse", "a wing in flight whose flap is moved", moves="anything"),
+    Experiment("taxi", "a wing on the ground, shaken at its root", moves="anything"),
     Experiment(OTHER, "any other run", moves="anything"),
 ):
     EXPERIMENTS.add(_experiment.name, _experiment)
