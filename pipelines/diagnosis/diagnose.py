@@ -24,11 +24,13 @@ from sloshlab.diagnosis.examination import examined, seen_at
 from sloshlab.diagnosis.findings import findings_of
 from sloshlab.diagnosis.verdict import verdict_of
 from sloshlab.errors import InputError
+from sloshlab.flight_twin.described_wing import MODEL
+from sloshlab.flight_twin.twin import flight_twin
 from sloshlab.identification.case import MOST_RUNS, Case, CaseRun, read_case
 from sloshlab.informative_runs import informative_runs
 from sloshlab.missing_physics.user_effects import load_user_effects
 from sloshlab.recording import run_attributes
-from sloshlab.user_twin import UserTwinModel, load_user_twin, with_known_drive
+from sloshlab.user_twin import BlockTwinModel, UserTwinModel, load_user_twin, with_known_drive
 
 
 def files_of(*, report: bool) -> tuple[str, ...]:
@@ -62,7 +64,7 @@ def diagnose_case(
         Python modules with effects of a user's own; their code is run.
     """
     target = output or folder / "diagnosis"
-    opened = opened_folder(folder, with_rig=twin is None)
+    opened = opened_folder(folder, with_rig=twin is None and not is_flight(folder))
     # Before the search, which takes minutes: a folder that is in the way has to be said at once.
     require_result_folder(target, files_of(report=report))
     diagnosis = diagnosed(opened, command=command, twin=twin, effects=effects, told=say)
@@ -109,7 +111,13 @@ def opened_folder(folder: Path, *, with_rig: bool = True) -> OpenedCase:
     """
     case = read_case(folder, with_rig=with_rig)
     files = sorted((folder / "recordings").glob("*.nc"))
-    return _examined(case, (*([folder / "rig.toml"] if with_rig else []), *files))
+    described = [folder / "rig.toml"] if with_rig else [folder / MODEL] if is_flight(folder) else []
+    return _examined(case, (*described, *files))
+
+
+def is_flight(folder: Path) -> bool:
+    """Whether a case is one of a wing in flight, which a model file describes in the place of a rig."""
+    return (folder / MODEL).is_file() and not (folder / "rig.toml").exists()
 
 
 def opened_recordings(name: str, runs: Sequence[RunSource], rig: RigSource | None) -> OpenedCase:
@@ -165,11 +173,16 @@ def diagnosed(
     """
     case, remarks = opened.case, list[str]()
     own = [effect for file in effects for effect in load_user_effects(file)]
-    model, cut = None, tuple[str, ...]()
+    model: UserTwinModel | None = None
+    cut = tuple[str, ...]()
     if twin is not None:
         described = load_user_twin(twin)
         case, cut = with_known_drive(case, described.driving)
         model = UserTwinModel(described, case.runs, name=f"twin {twin}", executor=WorkerThreads())
+    elif is_flight(case.folder):
+        wing = flight_twin(case.folder / MODEL)
+        case, cut = with_known_drive(case, wing.driving)
+        model = BlockTwinModel(wing, case.runs, name=f"model {case.folder / MODEL}", executor=WorkerThreads())
     # Before the search: who reads that a run is lacking may record it instead of waiting for an answer.
     untold = iter(informative_runs(case).lines)
     with amounts("diagnosing", _STAGES) as advance:
