@@ -25,7 +25,7 @@ VERSION = $(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' sloshlab/_version.py)
 DOCS_BRANCH ?= gh-pages
 
 .DEFAULT_GOAL := help
-.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks aircraft wing rom-study closed-loop replay campaign tank-campaign tank-scaling pictures tank-diagnosis trial rivals test test-newest test-all lint format type bench fuzz soak wheel docs docs-publish clean
+.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks aircraft wing rom-study closed-loop replay campaign tank-campaign tank-scaling pictures tank-diagnosis trial flight-trial rivals test test-newest test-all lint format type bench fuzz soak wheel docs docs-publish clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -121,6 +121,17 @@ trial: setup  ## a blind trial, sealed, diagnosed and scored (hours; goes on whe
 	test -f $(RESULTS)/trial/commitments.json || $(BIN)/sloshlab trial seal -o $(RESULTS)/trial --seed $(TRIAL_SEED) --key $(TRIAL_KEY)
 	env -u MAKEFLAGS -u TRIAL_KEY $(BIN)/sloshlab trial run $(RESULTS)/trial || test $$? -eq 3
 	$(BIN)/sloshlab trial score $(RESULTS)/trial --key $(TRIAL_KEY) -o $(RESULTS)/trial_scores
+
+flight-trial: setup  ## sixty virtual flights, sealed, diagnosed and scored (hours; goes on where it was stopped)
+	mkdir -p $(RESULTS) $(dir $(TRIAL_KEY))
+	test -f $(RESULTS)/flight_trial/commitments.json || { \
+	  $(BIN)/sloshlab virtual flight --model docs/examples/flight_wing.toml --cases 60 --seed $(TRIAL_SEED) \
+	    --truths $(TRIAL_KEY).flights.json -o $(RESULTS)/flight_trial && \
+	  $(BIN)/sloshlab trial commit $(RESULTS)/flight_trial $(TRIAL_KEY).flights.json \
+	    -o $(TRIAL_KEY).flights.locked --key $(TRIAL_KEY) && rm $(TRIAL_KEY).flights.json; }
+	env -u MAKEFLAGS -u TRIAL_KEY $(BIN)/sloshlab trial run $(RESULTS)/flight_trial --time-limit 900 || test $$? -eq 3
+	$(BIN)/sloshlab trial score $(RESULTS)/flight_trial --truths $(TRIAL_KEY).flights.locked --key $(TRIAL_KEY) \
+	  -o $(RESULTS)/flight_trial_scores
 
 rivals: setup  ## other ways to answer the cases of `make trial`, marked alike; needs the extra peers (hours)
 	test -f $(RESULTS)/trial_development/commitments.json || \

@@ -99,6 +99,8 @@ EXAMPLES: Final[dict[str, tuple[str, ...]]] = {
         "sloshlab virtual shaker_sweep --rig rig.toml --duration-s 6 -o sweep.nc",
         "sloshlab virtual shaker_sweep --rig rig.toml --levels 3,1.5,0.5 --repeats 2 -o sweeps",
         "sloshlab virtual shaker_vfa --rig rig.toml --liquid numerical --layers 16 -o vfa.nc",
+        "sloshlab virtual flight --model wing.toml --hide lift_gain=0.2 -o flight",
+        "sloshlab virtual flight --model wing.toml --cases 60 --truths kept/truths.json -o flights",
     ),
     "record": (
         "sloshlab record --source serial:/dev/ttyUSB0 --rig rig.toml --duration 240 -o run.nc",

@@ -47,8 +47,8 @@ def virtual(
     experiment: Annotated[
         str,
         typer.Argument(
-            help=f"{', '.join(_VIRTUAL)}, or campaign for a whole folder of raw_data.",
-            autocompletion=one_of((*_VIRTUAL, "campaign")),
+            help=f"{', '.join(_VIRTUAL)}; campaign for a whole folder of raw_data; flight for a wing.",
+            autocompletion=one_of((*_VIRTUAL, "campaign", "flight")),
         ),
     ],
     output: Annotated[
@@ -125,6 +125,23 @@ def virtual(
             callback=free_folder,
         ),
     ] = None,
+    model: Annotated[
+        Path | None, typer.Option("--model", metavar="MODEL.toml", help="Wing of a flight.", show_default=False)
+    ] = None,
+    hide: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME=VALUE,...", help="What a flight hides; its output is a folder.", show_default=False
+        ),
+    ] = "",
+    cases: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="So many drawn flights, as a challenge.", show_default=False),
+    ] = None,
+    truths: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Where truths of drawn flights go.", show_default=False),
+    ] = None,
     overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> None:
@@ -138,6 +155,16 @@ def virtual(
     )
     from pipelines.recording.virtual_repeats import make_repeats, parsed_levels
 
+    if experiment == "flight":
+        from pipelines.recording.virtual_flight import make_flight, make_flight_challenge
+
+        flown = (
+            make_flight(model, output, seed=seed, hide=hide)
+            if cases is None
+            else make_flight_challenge(model, output, truths, n_cases=cases, seed=seed)
+        )
+        finish(flown, as_json)
+        return
     of_laboratory = laboratory_seed_of(laboratory, laboratory_seed, is_campaign=experiment == CAMPAIGN)
     if experiment == CAMPAIGN:
         from acquisition.virtual_laboratory.numerical_campaign import CampaignSettings

@@ -41,6 +41,7 @@ from sealed_trial.sealing.selection import EVERYTHING, Selection
 from sealed_trial.sealing.trial_folder import COMMITMENTS
 from sloshlab import __version__, atomic_file
 from sloshlab.errors import InputError, SloshlabError
+from sloshlab.flight_twin.described_wing import read_flight_wing
 from sloshlab.recording import read_recording
 from sloshlab.rig import Rig
 from sloshlab.toml_file import read_toml
@@ -104,6 +105,10 @@ def _require_blocks(cases: Sequence[ChallengeCase], stated: Mapping[str, StatedT
         if case.twin is not None and any(effect.block == "tank" for effect in stated[case.name].effects):
             allowed = "excitation, structure or sensor: a twin of your own has no tank"
             raise InputError(f"truth of {case.name}: block", got="tank", allowed=allowed)
+        for effect in stated[case.name].effects:
+            if case.model is None and effect.block in ("aerodynamics", "control"):
+                allowed = "these blocks in cases with model.toml"
+                raise InputError(f"truth of {case.name}: block", got=effect.block, allowed=allowed)
 
 
 def check_challenge(folder: Path) -> dict[str, Any]:
@@ -150,7 +155,9 @@ def _unreadable(case: ChallengeCase) -> list[InputError]:
     """What a diagnosis could not read, and what it would read from elsewhere."""
     defects = []
     checks = [partial(_bytes_of, file) for file in case.recordings]
-    if case.twin is None:
+    if case.model is not None:
+        checks.append(partial(_checked_model, case.model))
+    elif case.twin is None:
         checks.append(partial(_checked_rig, case.folder / "rig.toml"))
     n_bytes = 0
     for check in checks:
@@ -173,6 +180,11 @@ def _checked_rig(file: Path) -> int:
     for text in _texts(read_toml(file, f"rig {file}")):
         if Path(text).is_absolute() or ".." in Path(text).parts:
             raise InputError(f"rig {file}", got=f"the path {ascii(text)[:80]}", allowed="files of its own case")
+    return 0
+
+
+def _checked_model(file: Path) -> int:
+    read_flight_wing(file)
     return 0
 
 

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from sealed_trial.challenge.stated_truth import UNNAMED, StatedEffect, StatedTruth
 from sloshlab.errors import InputError
+from sloshlab.flight_twin.effects import flight_effects
 from sloshlab.missing_physics import effects as _vocabulary
 from sloshlab.missing_physics.candidate import known_effects
 from sloshlab.missing_physics.units import named_and_units
@@ -23,9 +24,9 @@ _QUANTITY: Final = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*)", r
 
 
 def known_vocabulary() -> dict[tuple[str, str], frozenset[str]]:
-    """The vocabulary of a diagnosis."""
+    """The vocabulary of a diagnosis, that of wings in flight included."""
     found: dict[tuple[str, str], frozenset[str]] = {}
-    for effect in known_effects():
+    for effect in (*known_effects(), *flight_effects(1)):
         key = effect.block, effect.known_as
         found[key] = found.get(key, frozenset()) | set(effect.kinds_of_numbers)
     return found

@@ -1,6 +1,6 @@
 """The folder of a challenge, and everything in it that should not be there.
 
-CHALLENGE/cases/NAME/           rig.toml or twin.py, recordings/*.nc, and other *.nc that rig.toml names
+CHALLENGE/cases/NAME/           rig.toml, model.toml or twin.py; recordings/*.nc, other *.nc that rig.toml names
 CHALLENGE/commitments.json      optional: what was true, fixed before anybody answered
 CHALLENGE/answers.json          written by us: hashes of all answers
 CHALLENGE/diagnoses/NAME/       written by us: the answers
@@ -27,7 +27,8 @@ from sloshlab.errors import InputError
 
 CASES: Final = "cases"
 ANSWERS: Final = "answers.json"
-RIG, TWIN, RECORDINGS = "rig.toml", "twin.py", "recordings"
+RIG, TWIN, MODEL, RECORDINGS = "rig.toml", "twin.py", "model.toml", "recordings"
+_DESCRIPTIONS: Final = (RIG, TWIN, MODEL)
 PURPOSE: Final = "challenge"
 
 NAME_PATTERN: Final = r"[A-Za-z][A-Za-z0-9_-]{0,63}"
@@ -64,6 +65,11 @@ class ChallengeCase:
     def twin(self) -> Path | None:
         """The Python module that is its twin; None where rig.toml describes it."""
         return self.folder / TWIN if TWIN in self.files else None
+
+    @property
+    def model(self) -> Path | None:
+        """The model file of a wing in flight; None for other cases."""
+        return self.folder / MODEL if MODEL in self.files else None
 
     @property
     def recordings(self) -> tuple[Path, ...]:
@@ -186,7 +192,7 @@ def _found_case(name: str, folder: Path) -> tuple[ChallengeCase, list[InputError
                     break
                 if (trouble := _trouble(prefix, entry)) is not None:
                     what = f"case {name}: {_shown(prefix + entry.name)}"
-                    allowed = f"{RIG} or {TWIN}, {RECORDINGS}/NAME.nc, NAME.nc"
+                    allowed = f"{RIG}, {MODEL} or {TWIN}, {RECORDINGS}/NAME.nc, NAME.nc"
                     defects.append(InputError(what, got=trouble, allowed=allowed))
                 elif prefix or entry.name != RECORDINGS:
                     files[prefix + entry.name] = entry.stat(follow_symlinks=False).st_size
@@ -203,23 +209,22 @@ def _trouble(prefix: str, entry: os.DirEntry[str]) -> str | None:
         return None if stat.S_ISDIR(mode) else "a file in the place of a folder"
     if not stat.S_ISREG(mode):
         return "a folder" if stat.S_ISDIR(mode) else "no regular file"
-    is_known = bool(_RECORDING.fullmatch(entry.name)) or (not prefix and entry.name in (RIG, TWIN))
+    is_known = bool(_RECORDING.fullmatch(entry.name)) or (not prefix and entry.name in _DESCRIPTIONS)
     return None if is_known else "no file of a case"
 
 
 def _incomplete(case: ChallengeCase, sizes: dict[str, int]) -> list[InputError]:
     """What a case lacks, has twice or has too large."""
     defects = []
-    descriptions = [name for name in (RIG, TWIN) if name in sizes]
+    descriptions = [name for name in _DESCRIPTIONS if name in sizes]
     if len(descriptions) != 1:
         got = " and ".join(descriptions) or f"neither {RIG} nor {TWIN}"
-        defects.append(
-            InputError(f"case {case.name}", got=got, allowed=f"{RIG}, or {TWIN} for a twin of your own")
-        )
+        allowed = f"{RIG}, {MODEL} for a wing in flight, or {TWIN} for a twin of your own"
+        defects.append(InputError(f"case {case.name}", got=got, allowed=allowed))
     if not case.recordings:
         defects.append(InputError(f"case {case.name}", got=f"no {RECORDINGS}/*.nc", allowed="at least one"))
     for name, size in sizes.items():
-        most = LARGEST_TEXT_BYTES if name in (RIG, TWIN) else LARGEST_CASE_BYTES
+        most = LARGEST_TEXT_BYTES if name in _DESCRIPTIONS else LARGEST_CASE_BYTES
         if not 0 < size <= most:
             defects.append(InputError(f"case {case.name}: {name}", got=f"{size} bytes", allowed=f"1 … {most}"))
     if sum(sizes.values()) > LARGEST_CASE_BYTES >= max(sizes.values()):

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from sloshlab.errors import InputError
 
 Hidden = Literal["nothing", "wrong_baseline", "effects", "masked", "look_alikes", "outside"]
-Block = Literal["excitation", "structure", "tank", "sensor"]
+Block = Literal["excitation", "structure", "tank", "aerodynamics", "control", "sensor"]
 UNNAMED: Final = "unknown"
 """Name of physics that has none in any vocabulary."""
 

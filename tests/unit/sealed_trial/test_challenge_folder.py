@@ -88,7 +88,7 @@ DEFECTS: dict[str, tuple[Callable[[Path], object], str]] = {
     "a pipe": (lambda c: os.mkfifo(c / "cases" / "quiet" / "x.nc"), "case quiet: 'x.nc': got no regular file"),
     "a hint": (
         lambda c: (c / "cases" / "quiet" / "notes.txt").write_text("friction"),
-        "case quiet: 'notes.txt': got no file of a case; allowed: rig.toml or twin.py, recordings/NAME.nc",
+        "case quiet: 'notes.txt': got no file of a case; allowed: rig.toml, model.toml or twin.py, recordings/",
     ),
     "a folder deeper": (
         lambda c: (c / "cases" / "quiet" / "recordings" / "old").mkdir(),
