@@ -446,7 +446,9 @@ def _of_effect(candidate: Candidate, driving: Collection[str]) -> list[_Number]:
 
 def _only_channels(candidate: Candidate, driving: Collection[str]) -> tuple[str, ...]:
     """Channels that alone an effect changes; none given where it changes the motion."""
-    changed = channels_of(candidate.channel) if candidate.effect.block == "sensor" else ()
+    # an error of the airspeed is one of a sensor that is compared with nothing and moves everything
+    is_of_channels = candidate.effect.block == "sensor" and bool(candidate.channel)
+    changed = channels_of(candidate.channel) if is_of_channels else ()
     return () if any(name in driving for name in changed) else changed
 
 

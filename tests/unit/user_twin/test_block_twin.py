@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
@@ -14,12 +15,14 @@ from sloshlab.diagnosis.inference.places import transfers_of
 from sloshlab.errors import AnalysisError
 from sloshlab.identification.case import CaseRun
 from sloshlab.identification.diagnosed_model import ModelOfBlocks
+from sloshlab.identification.free_run_problem import FreeRunProblem
 from sloshlab.identification.observations import observations
 from sloshlab.missing_force.latent_force import run_forces
-from sloshlab.missing_physics.candidate import Effect, EffectParameter
+from sloshlab.missing_physics.candidate import Candidate, Effect, EffectParameter, Surroundings
 from sloshlab.missing_physics.extension import Extension
 from sloshlab.missing_physics.prior import Range
 from sloshlab.recording import run_attributes
+from sloshlab.rig import Rig
 from sloshlab.twin.structure_forces import COULOMB_FRICTION
 from sloshlab.user_twin import (
     BlockTwin,
@@ -152,11 +155,22 @@ def test_the_block_that_lacks_it_owns_the_mismatch(model: BlockTwinModel) -> Non
     assert shares["sensor"] == pytest.approx(0.8, abs=0.02)
 
 
-def test_an_extended_twin_keeps_its_numbers(model: BlockTwinModel, tmp_path: Path) -> None:
-    from sloshlab.missing_physics.candidate import Candidate
+def test_an_error_of_a_sensor_that_drives_changes_every_channel(model: BlockTwinModel) -> None:
+    """Its place is no channel: all are simulated anew where its size changes."""
+    observed = observations(model.runs[0], model.compared(model.runs[0]), ())
+    at = Surroundings(cast(Rig, None), model.twin, 1.0, 1.0, 1.0, 1.0, 1.0, {}, (), RATE, N / RATE)
+    candidate = Candidate(_effect("airspeed_error", "sensor", "gain_error"), at)
+    problem = FreeRunProblem(model, [observed], [candidate])
+    base = problem.theta_of({f"{candidate.key}.ratio": 0.0})
+    other = problem.theta_of({f"{candidate.key}.ratio": 0.2})
+    own = [i for i, name in enumerate(problem.names) if name.startswith(candidate.key)]
+    [moved] = problem.residuals_moved([other], own, problem.residual(base))
+    np.testing.assert_allclose(moved, problem.residual(other))
+    assert np.abs(moved).max() < 0.1 * np.abs(problem.residual(base)).max()
 
-    at = None
-    candidate = Candidate(EFFECTS[0], at)  # type: ignore[arg-type]  # what it adds asks for nothing of a case
+
+def test_an_extended_twin_keeps_its_numbers(model: BlockTwinModel, tmp_path: Path) -> None:
+    candidate = Candidate(EFFECTS[0], None)  # type: ignore[arg-type]  # what it adds asks for nothing of a case
     values = {"slope": 2.01, f"{candidate.key}.ratio": 0.2}
     model.save_extended(values, [candidate], tmp_path / "extended.toml")
     read, extension = load_extended(tmp_path / "extended.toml")
