@@ -86,16 +86,16 @@ def gust_case(
 
     # frozen liquids are linear: their largest acceleration tells the largest gust, the trained models then decide
     linear = _largest(flown(FROZEN, printed, min(_PASSAGE_S, settings.duration_s)))
-    amplitude = printed * min(1.0, _LARGEST_ACCELERATION_M_PER_S2 / linear)
-    for _ in range(_MOST_TRIES):
-        sloshing = flown(SLOSHING, amplitude)
+    first = printed * min(1.0, _LARGEST_ACCELERATION_M_PER_S2 / linear)
+    # the last one is kept, whatever its tanks feel: both liquids fly through the same gust
+    for amplitude in first * _SMALLER ** np.arange(_MOST_TRIES):
+        sloshing = flown(SLOSHING, float(amplitude))
         if not sloshing.response.ending and _largest(sloshing) <= _LARGEST_ACCELERATION_M_PER_S2:
             break
-        amplitude *= _SMALLER
     advance(f"{speed:g} m/s, gust of {amplitude:.3g} m/s")
     length = gust_length_m(state, settings)
     name = f"{speed:g} m/s, w = {amplitude:.3g} m/s"
-    case = RecordedCase(name, speed, amplitude, length, (flown(FROZEN, amplitude), sloshing))
+    case = RecordedCase(name, speed, float(amplitude), length, (flown(FROZEN, float(amplitude)), sloshing))
     return GustCase(case, readings_of(case, length / speed), printed)
 
 
