@@ -15,6 +15,9 @@ import numpy as np
 
 COMPUTED: Final = (
     # factor of the Reynolds number, rms change of W̄ in shares, rms change of β
+    (0.04**1.5, 0.4772, 0.0667),
+    (0.1**1.5, 0.2230, 0.0312),
+    (0.2**1.5, 0.1027, 0.0285),
     (2.0**1.5, 0.0494, 0.0241),
     (5.0**1.5, 0.0696, 0.0368),
     (25.0**1.5, 0.0520, 0.0192),
@@ -60,17 +63,17 @@ def scaling_error(reynolds: float, bond: float) -> ScalingError:
     Notes
     -----
     Root of the sum of squares of the computed change, of s_w |Re^(−1/2) − 1| for the layers along the walls and of
-    s_σ |1/Bo − 1| for surface tension. The computed change is interpolated in ln Re; beyond the largest that was
-    computed it stays, and `is_tested` says so. Smaller Reynolds numbers than that of the training are taken to
-    change as much as those larger by the same factor; they were not computed either.
+    s_σ |1/Bo − 1| for surface tension. The computed change is interpolated in ln Re; beyond the smallest and the
+    largest that were computed it stays, and `is_tested` says so.
     """
+    way = math.copysign(1.0, math.log(reynolds))
     distance = abs(math.log(reynolds))
-    known = np.array([(0.0, 0.0, 0.0), *((math.log(factor), *change) for factor, *change in COMPUTED)])
+    computed = sorted((way * math.log(factor), *change) for factor, *change in COMPUTED)
+    known = np.array([(0.0, 0.0, 0.0), *(row for row in computed if row[0] > 0)])
     # farther away an error does not become smaller; that it seems to is scatter
     work, beta = (
         float(np.interp(distance, known[:, 0], np.maximum.accumulate(known[:, column]))) for column in (1, 2)
     )
     layers = WALL_LAYERS * (reynolds**-0.5 - 1)
     tension = SURFACE_TENSION * (1 / bond - 1)
-    tested = reynolds >= 1 - 1e-9 and distance <= known[-1, 0] + 1e-9
-    return ScalingError(math.hypot(work, layers, tension), beta, tested)
+    return ScalingError(math.hypot(work, layers, tension), beta, bool(distance <= known[-1, 0] + 1e-9))
