@@ -21,8 +21,13 @@ SCALING_ROM := $(RESULTS)/tank_scaling/ROM_60x20.nc
 BALLS :=
 PATIENCE ?= 30
 FUZZ_SECONDS ?= 600
+# one more than cores: tests of devices wait for a clock most of their time
+TEST_WORKERS ?= 3
 VERSION = $(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' sloshlab/_version.py)
 DOCS_BRANCH ?= gh-pages
+
+# empty is unset for Python: without compiled modules every command that a test starts would compile the project anew
+export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := help
 .PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks aircraft wing rom-study closed-loop replay campaign tank-campaign tank-scaling pictures tank-diagnosis trial flight-trial rivals test test-newest test-all lint format type bench fuzz soak wheel docs docs-publish clean
@@ -140,14 +145,14 @@ rivals: setup  ## other ways to answer the cases of `make trial`, marked alike; 
 	  -o $(RESULTS)/rivals
 
 test: setup  ## the tests, at most 10 minutes on 2 cores
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
+	$(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadfile -m "not slow"
 
 test-newest:  ## the tests with the newest dependencies, in an environment of their own
 	rm -rf .venv-newest
 	$(MAKE) test VENV=.venv-newest LOCK=
 
 test-all: setup  ## all tests
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadfile
 
 lint: setup  ## style and the direction of imports
 	$(BIN)/ruff check .
