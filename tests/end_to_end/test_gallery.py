@@ -165,6 +165,7 @@ def test_the_work_of_a_damper_is_that_of_the_closed_form(run_script: Callable[[s
     np.testing.assert_allclose(windows["work_j"], np.pi * 900.0 * (0.2 * 9.81) ** 2 / omega**3, rtol=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(find_spec("panelaero") is None, reason="PanelAero is not installed: extra aircraft")
 def test_a_tank_under_a_flying_wing_changes_its_flutter(run_script: Callable[[str], Names]) -> None:
     """An independent script found 32.02 m/s, 31.60 m/s and +0.9 % in frequency."""

@@ -21,10 +21,10 @@ from acquisition.files.delay_compensation import delay_compensated
 from acquisition.files.time_base import uniform_grid
 from sloshlab.errors import ChannelMapError, InputError
 
-_N_DAMAGED = 16
+_N_DAMAGED = 8
 """Of each format; `make fuzz` goes on for as long as asked."""
 FUZZ = settings(
-    max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=30, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 SCALARS = (
     st.none()
