@@ -2,7 +2,7 @@
 
 Exit codes: 0 done; 1 the input is bad, one line on stderr; 2 usage; 3 done, but data were lost or a
 result is flagged; 130 interrupted, 129 and 143 terminated, nothing half-written. Commands import what they
-need when they run, so that ``sloshlab --help`` stays quick.
+need when they run, and only the module of the command that is called is loaded, so that each begins quickly.
 """
 
 from __future__ import annotations
@@ -11,93 +11,70 @@ import io
 import signal
 import sys
 from collections.abc import Sequence
-from typing import Any, NoReturn
+from importlib import import_module
+from typing import Any, Final, NoReturn
 
 import typer
 
-from pipelines.commands import demo  # they register themselves, in the order of the help
-
-# isort: split
-from pipelines.commands import recordings
-
-# isort: split
-from pipelines.commands import analysis
-
-# isort: split
-from pipelines.commands import models
-
-# isort: split
-from pipelines.commands import flutter
-
-# isort: split
-from pipelines.commands import aircraft
-
-# isort: split
-from pipelines.commands import wing
-
-# isort: split
-from pipelines.commands import case
-
-# isort: split
-from pipelines.commands import diagnosis
-
-# isort: split
-from pipelines.commands import field_benchmarks
-
-# isort: split
-from pipelines.commands import trial
-
-# isort: split
-from pipelines.commands import campaign
-
-# isort: split
-from pipelines.commands import laboratory
-
-# isort: split
-from pipelines.commands import info
-
-# isort: split
 from pipelines.commands.application import DONE_BUT_FLAGGED, INPUT_IS_BAD, INTERRUPTED, USAGE, app
 from pipelines.commands.completion import PROGRAM, answer_a_shell
 from pipelines.report.terminal import complain, say
 from sloshlab import interrupt
 from sloshlab.errors import RecordingInterruptedError, SloshlabError
 
-__all__ = [
-    "DONE_BUT_FLAGGED",
-    "INPUT_IS_BAD",
-    "INTERRUPTED",
-    "USAGE",
-    "aircraft",
-    "analysis",
-    "app",
-    "campaign",
-    "case",
-    "demo",
-    "diagnosis",
-    "field_benchmarks",
-    "flutter",
-    "info",
-    "laboratory",
-    "main",
-    "models",
-    "recordings",
-    "run",
-    "trial",
-    "wing",
-]
+__all__ = ["DONE_BUT_FLAGGED", "INPUT_IS_BAD", "INTERRUPTED", "USAGE", "application", "main", "run"]
+
+_PLACES: Final = {
+    "demo": "demo",
+    "import": "recordings",
+    "check": "recordings",
+    "analyse": "analysis",
+    "shaker": "analysis",
+    "work": "analysis",
+    "beam": "analysis",
+    "ball": "analysis",
+    "train": "models",
+    "validate": "models",
+    "study": "models",
+    "simulate": "models",
+    "flutter": "flutter",
+    "aircraft": "aircraft",
+    "wing": "wing",
+    "case": "case",
+    "diagnose": "diagnosis",
+    "benchmark": "field_benchmarks",
+    "trial": "trial",
+    "campaign": "campaign",
+    "virtual": "laboratory",
+    "record": "laboratory",
+    "recover": "laboratory",
+    "replay": "laboratory",
+    "info": "info",
+}
+"""Modules of the commands, which register themselves when they are imported; in the order of the help."""
 
 # typer brings its own click or uses the installed one; either way this is the root of its usage errors
 _UsageError: Any = next(base for base in typer.BadParameter.__mro__ if base.__name__ == "ClickException")
 
 
+def application(words: Sequence[str] = ()) -> typer.Typer:
+    """The application with the command that words begin with, or with every one where they begin with none."""
+    asked = _PLACES.get(words[0]) if words else None
+    for module in dict.fromkeys([asked] if asked else _PLACES.values()):
+        import_module(f"pipelines.commands.{module}")
+    order = list(_PLACES)
+    app.registered_commands.sort(key=lambda command: order.index(command.name or command.callback.__name__))  # type: ignore[union-attr]
+    app.registered_groups.sort(key=lambda group: order.index(group.name or ""))
+    return app
+
+
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
     try:
         answer_a_shell()
         with interrupt.never_lost():
-            words = list(arguments) if arguments is not None else None
-            code = int(app(args=words, prog_name=PROGRAM, standalone_mode=False) or 0)
+            code = int(application(words)(args=words, prog_name=PROGRAM, standalone_mode=False) or 0)
         if code == INTERRUPTED:  # some versions of typer turn Ctrl-C into this code without a word
             raise KeyboardInterrupt
         return code

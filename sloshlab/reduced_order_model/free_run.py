@@ -43,7 +43,8 @@ class SensitivitySums(NamedTuple):
     gradient: FloatArray  # Σ S e
 
 
-@njit(cache=True)
+# distances are summed in any order, so that several differences are squared at once: 3e-16 of the output
+@njit(cache=True, fastmath={"reassoc"})
 def evaluate(kind, theta, phi, features, factors):  # type: ignore[no-untyped-def]
     """Output of a radial basis network for one sample; fills features (n_neurons) and G (n_neurons)."""
     p, m = phi.size, features.size

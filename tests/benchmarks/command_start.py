@@ -43,10 +43,10 @@ def start_figures(folder: Path) -> dict[str, float]:
 
 def commands(group: Any = None, path: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
     """Every command, by its words; the program itself is the empty one."""
-    from pipelines.command_line import app
+    from pipelines.command_line import application
 
     yield path
-    for name, command in getattr(group or typer.main.get_command(app), "commands", {}).items():
+    for name, command in getattr(group or typer.main.get_command(application()), "commands", {}).items():
         yield from commands(command, (*path, name))
 
 

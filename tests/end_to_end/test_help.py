@@ -17,12 +17,12 @@ import pytest
 import typer.main
 from short_runs import INPUT_IS_BAD, USAGE
 
-from pipelines.command_line import app, run
+from pipelines.command_line import application, run
 from pipelines.commands.examples import EXAMPLES, examples_of
 from sloshlab import __version__
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-PROGRAM = typer.main.get_command(app)
+PROGRAM = typer.main.get_command(application())
 CHEAP = {
     "sloshlab demo --list",
     "sloshlab benchmark --list",

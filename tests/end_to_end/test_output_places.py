@@ -10,7 +10,7 @@ import pytest
 import typer
 from short_runs import INPUT_IS_BAD, assert_one_line
 
-from pipelines.command_line import app, run
+from pipelines.command_line import application, run
 
 RUN, RIG = ["absent.nc"], ["--rig", "absent.toml"]
 FOLDERS: dict[str, list[str]] = {
@@ -104,7 +104,7 @@ def test_a_folder_above_that_does_not_exist_is_made(laboratory: Path, capsys: An
 
 
 def options_that_write() -> Iterator[str]:
-    command: Any = typer.main.get_command(app)
+    command: Any = typer.main.get_command(application())
     trial = command.commands["trial"].commands
     for name, sub in {**command.commands, **{f"trial {key}": sub for key, sub in trial.items()}}.items():
         for parameter in sub.params:

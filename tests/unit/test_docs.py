@@ -17,7 +17,7 @@ import typer.main
 import yaml
 
 import sloshlab
-from pipelines.command_line import app
+from pipelines.command_line import application
 from sloshlab import __version__
 from sloshlab.experiments import EXPERIMENTS
 from sloshlab.quantities import QUANTITIES
@@ -27,7 +27,7 @@ DOCS = REPOSITORY / "docs"
 GENERATED = DOCS / "generated"
 PAGES = sorted(page for page in DOCS.rglob("*.md") if GENERATED not in page.parents)
 OLD_TRIALS = REPOSITORY / "sealed_trial" / "archive" / "trials_1_to_13.tar.xz"
-COMMANDS = typer.main.get_command(app).commands
+COMMANDS = typer.main.get_command(application()).commands
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 NAMED_FILE = re.compile(r"^`([\w.]+\.\w+)`:[^`]*?\n\n```\w+\n(.*?)^```", re.MULTILINE | re.DOTALL)
 BARE_LINK = re.compile(r"\s*(?:[-*] |\[[^\]]*\]: )?<?https?://\S+")

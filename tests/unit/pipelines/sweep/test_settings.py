@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from typing import Any
 
-from pipelines.command_line import analysis
+from pipelines.commands import analysis
 from pipelines.sweep.shaker import ShakerSettings
 from sloshlab.sweep.windows import WindowSettings
 
