@@ -62,7 +62,9 @@ def shaker(
     if boundaries not in ("measured", "law"):
         raise typer.BadParameter(f"{boundaries!r} is neither 'measured' nor 'law'", param_hint="--boundaries")
     require_result_folder(output, files_of(report=not no_report))
-    settings = ShakerSettings.checked(p=p, m=m, boundaries=boundaries, allow_incomplete=allow_incomplete)
+    settings = ShakerSettings.checked(
+        p=p, m=m, boundaries=boundaries, allow_incomplete=allow_incomplete, has_report=not no_report
+    )
     experiment = analyse_shaker(runs, rig, settings)
     finish(write_experiment(experiment, output, command=command_as_given(), report=not no_report), as_json)
 

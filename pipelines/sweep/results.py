@@ -27,11 +27,12 @@ BoolArray = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class SweepOptions:
-    """Choices of the analysis: windows, boundaries, what to do with a sweep that stops early."""
+    """Choices of the analysis: windows, boundaries, what to do with a sweep that stops early, what is kept."""
 
     windows: WindowSettings = field(default_factory=WindowSettings)
     boundaries: str = "measured"
     allow_incomplete: bool = False
+    has_report: bool = True  # keeps the signals of every window, which only a report shows
 
 
 @dataclass(frozen=True)

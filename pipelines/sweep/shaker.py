@@ -50,7 +50,9 @@ class ShakerSettings(SweepOptions):
     """Choices of the shaker analysis, checked."""
 
     @classmethod
-    def checked(cls, *, p: int, m: int, boundaries: str, allow_incomplete: bool) -> ShakerSettings:
+    def checked(
+        cls, *, p: int, m: int, boundaries: str, allow_incomplete: bool, has_report: bool = True
+    ) -> ShakerSettings:
         """Settings from the command line.
 
         Raises
@@ -61,7 +63,7 @@ class ShakerSettings(SweepOptions):
         if boundaries not in ("measured", "law"):
             raise InputError("--boundaries", got=repr(boundaries), allowed="measured or law")
         windows = WindowSettings(half_width_cycles=p, spacing_cycles=m)
-        return cls(windows=windows, boundaries=boundaries, allow_incomplete=allow_incomplete)
+        return cls(windows, boundaries, allow_incomplete, has_report)
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,8 @@ BoolArray = npt.NDArray[np.bool_]
 
 EXCERPT_FREQUENCIES_HZ = (9.0, 13.0, 17.0)
 """Reference points of Table 1.2, where time histories and loops are shown."""
+_OF_EXCERPT = ["frequency_hz", "time_s", "acceleration_g"]
+"""What an excerpt reads of its window, cut out of the others once."""
 _EARLY_STOP_SHARE = 0.03
 """A sweep must move during all but this share of the time it is stated or recorded to last."""
 _SMALLEST_NUMBER_OF_SAMPLES_PER_CYCLE = 8
@@ -172,7 +174,9 @@ def analyse_sweep(
         flags=tuple(flags),
         start_time_s=start_time_s,
         signals=signals if keep_signals else None,
-        window_signals=_signals_of_windows(windows, signals, rig, rate_hz, start_time_s),
+        window_signals=_signals_of_windows(windows, signals, rig, rate_hz, start_time_s)
+        if options.has_report
+        else (),
     )
 
 
@@ -245,7 +249,8 @@ def _excerpts(
         wanted = np.quantile(frequency, [0.25, 0.5, 0.75])
     # two places may have the same nearest window, which is shown once
     nearest = sorted({int(np.abs(frequency - wanted_hz).argmin()) for wanted_hz in wanted})
-    return tuple(excerpt_of(windows.isel(window=at), signals, rig, rate_hz, start_time_s) for at in nearest)
+    read = windows[_OF_EXCERPT]
+    return tuple(excerpt_of(read.isel(window=at), signals, rig, rate_hz, start_time_s) for at in nearest)
 
 
 def _signals_of_windows(
@@ -254,8 +259,9 @@ def _signals_of_windows(
     """What is seen of every window; none without a displacement."""
     if signals.motion_is_velocity:
         return ()
+    read = windows[_OF_EXCERPT]
     return tuple(
-        window_signals(excerpt_of(windows.isel(window=at), signals, rig, rate_hz, start_time_s))
+        window_signals(excerpt_of(read.isel(window=at), signals, rig, rate_hz, start_time_s))
         for at in range(windows.sizes["window"])
     )
 

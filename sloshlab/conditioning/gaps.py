@@ -102,12 +102,20 @@ def runs(mask: BoolArray, value: bool) -> list[tuple[int, int]]:
     >>> runs(np.array([True, False, False, True]), False)
     [(1, 3)]
     """
-    if mask.size == 0:
-        return []
-    changes = np.flatnonzero(mask[1:] != mask[:-1]) + 1
-    bounds = [0, *changes.tolist(), int(mask.size)]
-    first = 0 if bool(mask[0]) == value else 1
-    return list(zip(bounds[first:-1:2], bounds[first + 1 :: 2], strict=True))
+    return [(start, stop) for start, stop in run_bounds(mask, value).tolist()]
+
+
+def run_bounds(mask: BoolArray, value: bool) -> npt.NDArray[np.int64]:
+    """The same as an array, shape (n, 2): thousands of them cost no Python object each.
+
+    Examples
+    --------
+    >>> run_bounds(np.array([True, False, False, True]), True).tolist()
+    [[0, 1], [3, 4]]
+    """
+    is_value = np.zeros(mask.size + 2, dtype=np.bool_)
+    is_value[1:-1] = mask if value else ~mask
+    return np.flatnonzero(is_value[1:] != is_value[:-1]).reshape(-1, 2)
 
 
 def longest_whole_stretch(usable: BoolArray) -> slice:

@@ -15,7 +15,7 @@ import xarray as xr
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from sloshlab.conditioning.clipping import clipped_samples, clipping
-from sloshlab.conditioning.gaps import runs, sampling_step_s
+from sloshlab.conditioning.gaps import run_bounds, sampling_step_s
 from sloshlab.conditioning.quality import LARGEST_CLIPPED_FRACTION
 from sloshlab.consistency.finding import Action, BoolArray, Finding
 from sloshlab.recording import channels
@@ -106,8 +106,10 @@ def examined_samples(
     time = recording["time"].values
     for name in signals if names is None else [name for name in names if name in signals]:
         # a blow is felt by more than one sensor, a disturbed sample by one
-        spiked = spikes(errors[name]) & ~_felt_elsewhere(name, errors)
-        spiked &= np.abs(prediction_error(signals[name])) > _SMALLEST_SPIKE * np.nanstd(signals[name])
+        spiked = spikes(errors[name])
+        if spiked.any():
+            spiked &= ~_felt_elsewhere(name, errors)
+            spiked &= np.abs(prediction_error(signals[name])) > _SMALLEST_SPIKE * np.nanstd(signals[name])
         of_check = {
             "cut off": _cut_off(recording[name]),
             "held samples": held_samples(signals[name], rate_hz),
@@ -135,7 +137,7 @@ def _over_its_largest(channel: xr.DataArray) -> FloatArray | None:
 
 def _found(check: str, name: str, samples: BoolArray, time: FloatArray) -> Finding:
     at = np.flatnonzero(samples)
-    text = f"{at.size} samples in {len(runs(samples, True))} places: {SAMPLE_CHECKS[check]}"
+    text = f"{at.size} samples in {len(run_bounds(samples, True))} places: {SAMPLE_CHECKS[check]}"
     # as of samples at a stated limit: few cost the cycles that they touch, many cost the run
     too_many = check == "cut off" and at.size > LARGEST_CLIPPED_FRACTION * samples.size
     action = Action.REFUSED if too_many else Action.MASKED
@@ -148,7 +150,15 @@ def _felt_elsewhere(name: str, errors: Mapping[str, FloatArray]) -> BoolArray:
 
 
 def _widened(mask: BoolArray, n: int) -> BoolArray:
-    return np.asarray(maximum_filter1d(mask.astype(np.uint8), n).astype(np.bool_))
+    """True where any of n samples about each is, the one more of an even n being before it."""
+    wide = mask.copy()
+    # most masks of most runs are empty
+    if mask.any():
+        for k in range(1, n // 2 + 1):
+            wide[k:] |= mask[:-k]
+        for k in range(1, n - n // 2):
+            wide[:-k] |= mask[k:]
+    return wide
 
 
 def _cut_off(channel: xr.DataArray) -> BoolArray:
@@ -172,17 +182,17 @@ def held_samples(values: FloatArray, rate_hz: float) -> BoolArray:
     """
     equal = np.concatenate([[False], values[1:] == values[:-1]])
     held = np.zeros(values.size, dtype=np.bool_)
-    long_runs = [(start - 1, stop) for start, stop in runs(equal, True) if stop - start + 1 >= _SHORTEST_HOLD]
-    if not long_runs:
+    bounds = run_bounds(equal, True)
+    long_runs = bounds[bounds[:, 1] - bounds[:, 0] + 1 >= _SHORTEST_HOLD] - (1, 0)
+    if not long_runs.size:
         return held
     changes = np.abs(np.diff(values))
     step = float(np.min(changes[changes > 0], initial=math.inf))
     n = round(_NEIGHBOURHOOD_S * rate_hz)
-    for start, stop in long_runs:
-        longest = max(
-            _longest_hold(values[max(0, start - n) : start], step), _longest_hold(values[stop : stop + n], step)
-        )
-        if stop - start > max(_HOLD_MARGIN * longest, _SHORTEST_HOLD - 1):
+    for start, stop in long_runs.tolist():
+        sides = values[max(0, start - n) : start], values[stop : stop + n]
+        # the side that is too slow for a hold spares the other
+        if all(stop - start > _HOLD_MARGIN * _longest_hold(side, step) for side in sides):
             held[start:stop] = True
     return held
 
@@ -194,9 +204,11 @@ def repeated_samples(values: FloatArray) -> BoolArray:
     """
     change = np.abs(np.diff(values))
     repeated = np.concatenate([[False], change == 0])
-    moving = change[np.isfinite(change) & (change > 0)]
     none = np.zeros(values.size, dtype=np.bool_)
-    if moving.size == 0 or repeated.mean() < _REPEATED_SHARE:
+    if repeated.mean() < _REPEATED_SHARE:
+        return none
+    moving = change[np.isfinite(change) & (change > 0)]
+    if moving.size == 0:
         return none
     # equal neighbours are no wonder where the signal changes by a step of the converter or two
     return repeated if float(np.median(moving)) > _REPEATED_STEPS * float(moving.min()) else none
@@ -222,25 +234,28 @@ def filled_samples(values: FloatArray, rate_hz: float) -> BoolArray:
     error = prediction_error(values)
     # NaN neither hides nor makes a stretch: it counts as noise
     power = np.where(np.isfinite(error), error**2, np.finfo(np.float64).max)
-    largest = maximum_filter1d(power, _QUIETEST_STRETCH)
-    n = round(_NEIGHBOURHOOD_S * rate_hz)
     finite = np.where(np.isfinite(error), power, 0.0)
-    usual = uniform_filter1d(np.minimum(finite, 9 * np.median(finite)), n)
-    # the quieter side: before a motion starts and after it stops nothing is compared
+    typical = float(np.median(finite))
+    # the steps of a converter alone leave 0.4 of a step: only a channel with noise beyond them can lack it
+    changes = np.abs(np.diff(values))
+    step = float(np.min(changes[changes > 0], initial=math.inf))
+    if not math.sqrt(typical) > _BEYOND_STEPS * step:
+        return np.zeros(values.size, dtype=np.bool_)
+    largest = maximum_filter1d(power, _QUIETEST_STRETCH)
+    # nowhere near as quiet as the channel often is: a modulated motion has calm moments of its own
+    quiet = largest < _MADE_UP_SHARE**2 * float(np.quantile(largest, _OFTEN))
+    if not quiet.any():
+        return quiet
+    n = round(_NEIGHBOURHOOD_S * rate_hz)
+    usual = uniform_filter1d(np.minimum(finite, 9 * typical), n)
+    # and than the quieter side: before a motion starts and after it stops nothing is compared
     beside = np.minimum(np.roll(usual, n), np.roll(usual, -n))
     beside[:n] = beside[-n:] = 0.0
     # sums that run along a signal leave their rounding where it is zero
     beside[beside < _ROUNDING * np.max(usual)] = 0.0
-    # and nowhere near as quiet as the channel often is: a modulated motion has calm moments of its own
-    often = float(np.quantile(largest, _OFTEN))
-    # the steps of a converter alone leave 0.4 of a step: only a channel with noise beyond them can lack it
-    changes = np.abs(np.diff(values))
-    step = float(np.min(changes[changes > 0], initial=math.inf))
-    if not math.sqrt(float(np.median(finite))) > _BEYOND_STEPS * step:
-        return np.zeros(values.size, dtype=np.bool_)
-    quiet = largest < _MADE_UP_SHARE**2 * np.minimum(beside, often)
+    quiet &= largest < _MADE_UP_SHARE**2 * beside
     # back to all samples of the stretches that were seen at their middle; the error reaches over two to each side
-    return np.asarray(maximum_filter1d(quiet.astype(np.uint8), _QUIETEST_STRETCH + 4).astype(np.bool_))
+    return _widened(quiet, _QUIETEST_STRETCH + 4)
 
 
 def standardised_errors(values: FloatArray, rate_hz: float) -> FloatArray:
@@ -250,7 +265,7 @@ def standardised_errors(values: FloatArray, rate_hz: float) -> FloatArray:
     error[_widened(~there, 9)] = 0.0
     n = max(round(_NEIGHBOURHOOD_S * rate_hz), 5)
     # the median of |e| is 0.6745 σ of a normal distribution
-    standardised = 0.6745 * error / np.sqrt(_local_median_power(error, n))
+    standardised = 0.6745 * error / _usual_size(error, n)
     # beside a stretch without any noise everything is a spike, by any factor
     return np.asarray(np.clip(standardised, -_LARGEST_STANDARDISED, _LARGEST_STANDARDISED))
 
@@ -268,20 +283,25 @@ def spikes(standardised: FloatArray) -> BoolArray:
     """
     pattern_power = float((_PREDICTION_ERROR**2).sum())
     size = np.convolve(standardised, _PREDICTION_ERROR[::-1], mode="same") / pattern_power
+    large = np.abs(size) > _SPIKE_SIGMA
+    if not large.any():
+        return large
     power = np.convolve(standardised**2, np.ones(5), mode="same")
     explained = size**2 * pattern_power
     # a bend of the signal, as of a drive that changes its slope, leaves 1, −2, 1, which is nearly the same
     bend = np.convolve(standardised, _BEND, mode="same") ** 2 / (_BEND**2).sum()
-    found = (np.abs(size) > _SPIKE_SIGMA) & (explained > _SPIKE_SHAPE * power) & (explained > bend)
+    found = large & (explained > _SPIKE_SHAPE * power) & (explained > bend)
     # the largest of its surroundings only: its tails fit the pattern less
     return np.asarray(found & (np.abs(size) >= maximum_filter1d(np.abs(size), 5)))
 
 
-def _local_median_power(error: FloatArray, n: int) -> FloatArray:
-    """Median of e² in blocks of n, the largest of three blocks in a row, one value per sample."""
+def _usual_size(error: FloatArray, n: int) -> FloatArray:
+    """Root of the median of e² in blocks of n, of the largest of three blocks in a row; one value per sample."""
     n_blocks = max(error.size // n, 1)
     medians = np.median((error[: n_blocks * n].reshape(n_blocks, -1)) ** 2, axis=1)
     wide = maximum_filter1d(medians, 3, mode="nearest")
-    at = np.minimum(np.arange(error.size) // max(error.size // n_blocks, 1), n_blocks - 1)
     # a channel without any noise has its rounding
-    return np.asarray(np.maximum(wide[at], np.finfo(np.float64).tiny))
+    size = np.sqrt(np.maximum(wide, np.finfo(np.float64).tiny))
+    n_of_block = np.full(n_blocks, max(error.size // n_blocks, 1))
+    n_of_block[-1] += error.size - n_of_block.sum()
+    return np.repeat(size, n_of_block)
