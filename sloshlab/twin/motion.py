@@ -58,11 +58,9 @@ class Motion:
 
     def _relative(self, order: int) -> FloatArray:
         """Displacement, velocity or acceleration of the tank relative to the base."""
-        total = np.zeros(self.modes.shape[0])
-        if self.twin.structure is not None:
-            for j, deflection in enumerate(self.twin.structure.mode_shape):
-                total += deflection * self.modes[:, order, j]
-        return total
+        if self.twin.structure is None:
+            return np.zeros(self.modes.shape[0])
+        return np.asarray(self.modes[:, order] @ self.twin.structure.mode_shape)
 
     @property
     def base_acceleration_m_per_s2(self) -> FloatArray:
