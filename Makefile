@@ -23,6 +23,7 @@ PATIENCE ?= 30
 FUZZ_SECONDS ?= 600
 # one more than cores: tests of devices wait for a clock most of their time
 TEST_WORKERS ?= 3
+BENCH ?=
 VERSION = $(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' sloshlab/_version.py)
 DOCS_BRANCH ?= gh-pages
 
@@ -30,7 +31,7 @@ DOCS_BRANCH ?= gh-pages
 export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks aircraft wing rom-study closed-loop replay campaign tank-campaign tank-scaling pictures tank-diagnosis trial flight-trial rivals test test-newest test-all lint format type bench fuzz soak wheel docs docs-publish clean
+.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks aircraft wing rom-study closed-loop replay campaign tank-campaign tank-scaling pictures tank-diagnosis trial flight-trial rivals test test-newest test-all lint format type bench bench-history fuzz soak wheel docs docs-publish clean
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -166,8 +167,11 @@ format: setup  ## put the code into the project's format
 type: setup  ## static types
 	$(BIN)/mypy
 
-bench: setup  ## speed and memory as ratios in one run
-	$(BIN)/python -m tests.benchmarks
+bench: setup  ## speed and memory as ratios in one run (or BENCH="twin start", groups of them), kept in results/bench.json
+	$(BIN)/python -m tests.benchmarks $(BENCH)
+
+bench-history: setup  ## the figures of the last `make bench` into the history of revisions, and its figure in docs
+	$(BIN)/python -m tests.benchmarks.history
 
 fuzz: setup  ## damaged files to every reader, for FUZZ_SECONDS (600): no crash, no hang, no more than 2 GiB
 	$(BIN)/python -m tests.fuzz --seconds $(FUZZ_SECONDS)

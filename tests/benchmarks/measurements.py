@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import itertools
 import json
-import os
 import resource
 import sys
+import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -33,9 +33,14 @@ def best_of(action: Callable[[], object], n: int) -> float:
 
 def processor_s(action: Callable[[], object]) -> float:
     """Processor time of a call [s], of this process and of those that it waited for."""
-    before = os.times()
+    before = _used_s()
     action()
-    return sum(os.times()[:4]) - sum(before[:4])
+    return _used_s() - before
+
+
+def _used_s() -> float:
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + children.ru_utime + children.ru_stime
 
 
 def best_in_turn(actions: Mapping[str, Callable[[], object]], n: int) -> dict[str, float]:
@@ -60,8 +65,8 @@ def make(folder: str) -> dict[str, float]:
     return {}
 
 
-def write_chirp(path: Path, duration_s: float) -> None:
-    """Octave sweep from 5 to 20 Hz of a damped mass, five channels of 16-bit counts."""
+def write_chirp(path: Path, duration_s: float, n_copies: int = 1) -> None:
+    """Octave sweep from 5 to 20 Hz of a damped mass, five channels of 16-bit counts, or so many times five."""
     from sloshlab.recording import write_recording
 
     t = np.arange(round(duration_s * RATE_HZ)) / RATE_HZ
@@ -72,10 +77,9 @@ def write_chirp(path: Path, duration_s: float) -> None:
     force = 0.35 * acceleration + 1.5 * np.sin(phase)
     rng = np.random.default_rng(0)
     variables, encoding = {}, {}
-    for name, values, units in (
-        ("force_cell_1", force, "N"), ("force_cell_2", force, "N"), ("acceleration_roof_1", acceleration, "m s-2"),
-        ("acceleration_roof_2", acceleration, "m s-2"), ("acceleration_control", acceleration, "m s-2"),
-    ):  # fmt: skip
+    cells = [(f"force_cell_{k + 1}", force / n_copies, "N") for k in range(2 * n_copies)]
+    roof = [(f"acceleration_roof_{k + 1}", acceleration, "m s-2") for k in range(3 * n_copies - 1)]
+    for name, values, units in (*cells, *roof, ("acceleration_control", acceleration, "m s-2")):
         noisy = values + 0.002 * rng.standard_normal(t.size)
         variables[name] = ("time", noisy, {"units": units, "quantity": name.partition("_")[0]})
         encoding[name] = {"dtype": "int16", "scale_factor": 0.002, "_FillValue": np.int16(-32768), "complevel": 1}
@@ -87,7 +91,8 @@ def write_chirp(path: Path, duration_s: float) -> None:
     write_recording(recording, path, encoding=encoding | {"time": {"complevel": 1}})
 
 
-def _analysis(recording: str, folder: str) -> Callable[[], object]:
+def sweep_analysis(recording: str, folder: str) -> Callable[[], object]:
+    """A call that takes a recording to windows and maps."""
     from pipelines.sweep.outputs import write_experiment
     from pipelines.sweep.shaker import ShakerSettings, analyse_shaker
 
@@ -104,10 +109,17 @@ def analyse(recording: str, folder: str) -> dict[str, float]:
     """Time of the whole analysis and of reading alone."""
     from sloshlab.recording import read_recording
 
-    action = _analysis(recording, folder)
+    action = sweep_analysis(recording, folder)
     action()
     n = 5 if Path(recording).stat().st_size < 30e6 else 3
     return best_in_turn({"analysis_s": action, "read_s": lambda: read_recording(recording)}, n)
+
+
+def growth(short: str, long: str, folder: str) -> dict[str, float]:
+    """Times of the analysis of a recording and of one that is ten times as long, in turn in one process."""
+    actions = {"short_s": sweep_analysis(short, folder), "long_s": sweep_analysis(long, folder)}
+    actions["short_s"]()
+    return best_in_turn(actions, 3)
 
 
 def memory(recording: str, folder: str) -> dict[str, float]:
@@ -117,10 +129,10 @@ def memory(recording: str, folder: str) -> dict[str, float]:
     """
     from sloshlab.recording import read_recording
 
-    action = _analysis(recording, folder)
+    action = sweep_analysis(recording, folder)
     short = Path(folder, "short.nc")
     write_chirp(short, 20.0)
-    _analysis(str(short), folder)()
+    sweep_analysis(str(short), folder)()
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     action()
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -181,15 +193,28 @@ def flutter() -> dict[str, float]:
     return flutter_figures()
 
 
+def flights() -> dict[str, float]:
+    """Speed of wings and of an aircraft in flight."""
+    from tests.benchmarks.flights import flight_figures
+
+    return flight_figures()
+
+
+def scaling() -> dict[str, float]:
+    """How cost grows."""
+    from tests.benchmarks.scaling import scaling_figures
+
+    return scaling_figures()
+
+
+def formats() -> dict[str, float]:
+    """Speed of reading every format."""
+    from tests.benchmarks.file_formats import format_figures
+
+    return format_figures()
+
+
 if __name__ == "__main__":
-    measurements = {
-        "make": make,
-        "analyse": analyse,
-        "memory": memory,
-        "peer": peer,
-        "blas": blas,
-        "twin": twin,
-        "flutter": flutter,
-    }
-    chosen = measurements[sys.argv[1]]
+    measurements = (make, analyse, growth, memory, peer, blas, twin, flutter, flights, scaling, formats)
+    chosen = {measurement.__name__: measurement for measurement in measurements}[sys.argv[1]]
     print(json.dumps(chosen(*sys.argv[2:])))

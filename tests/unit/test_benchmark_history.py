@@ -1,0 +1,62 @@
+"""What benchmarks keep: one entry per revision and machine, and how much of each aim was used."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+from tests.benchmarks.__main__ import AIMS, AT_LEAST, GROUPS
+from tests.benchmarks.history import HISTORY, draw, keep, machine, over_aims, with_entry
+
+
+def run(revision: str, **figures: float) -> dict[str, object]:
+    return {"revision": revision, "date": "2026-01-01", "machine": "m", "figures": figures}
+
+
+def test_groups_of_one_run_share_an_entry_and_others_keep_theirs() -> None:
+    history = with_entry([], run("a", x=1.0, y=2.0))
+    history = with_entry(history, run("b", x=3.0))
+    history = with_entry(history, run("a", y=20.0, z=math.inf))
+    assert [(entry["revision"], entry["figures"]) for entry in history] == [
+        ("b", {"x": 3.0}),
+        ("a", {"x": 1.0, "y": 20.0}),
+    ]
+    other = with_entry(history, {**run("a", x=5.0), "machine": "another"})
+    assert len(other) == 3
+
+
+def test_figures_above_and_below_their_aims_are_told_apart() -> None:
+    history = [run("a", time=3.0, ratio=25.0), run("b", time=1.5, ratio=100.0, lost=0.0)]
+    used = over_aims(history, {"time": 2.0, "lost": 0.0, "absent": 1.0}, {"ratio": 50.0})
+    assert used == {"time": [1.5, 0.75], "ratio": [2.0, 0.5]}
+
+
+def test_a_run_is_kept_with_its_machine_and_groups_are_joined(tmp_path: Path) -> None:
+    path = tmp_path / "results" / "bench.json"
+    keep({"x": 1.0}, path)
+    keep({"y": 2.0}, path)
+    found = json.loads(path.read_text(encoding="utf-8"))
+    assert found["figures"] == {"x": 1.0, "y": 2.0}
+    assert found["machine"] == machine() and "cores" in found["machine"]
+
+
+def test_the_kept_history_knows_every_aim_that_it_is_drawn_with(tmp_path: Path) -> None:
+    history = json.loads(HISTORY.read_text(encoding="utf-8"))
+    for entry in history:
+        assert set(entry) == {"revision", "date", "machine", "figures"}
+        assert all(math.isfinite(value) for value in entry["figures"].values())
+    assert over_aims(history, AIMS, AT_LEAST)
+    draw(history, tmp_path / "history.png")
+    assert (tmp_path / "history.png").stat().st_size > 10_000
+
+
+def test_a_group_that_is_not_there_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    from tests.benchmarks.__main__ import main
+
+    monkeypatch.setattr("sys.argv", ["benchmarks", "twins"])
+    with pytest.raises(SystemExit, match=r"got twins; allowed: analysis, twin"):
+        main()
+    assert {"analysis", "formats", "flights", "scaling"} <= set(GROUPS)
