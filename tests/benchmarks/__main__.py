@@ -29,7 +29,7 @@ from tests.benchmarks.command_start import (
 from tests.benchmarks.diagnosis import LONGEST_LABEL, MEDIAN_LABEL, diagnosis_figures
 from tests.benchmarks.diagnosis import MEMORY_LABEL as DIAGNOSIS_MEMORY_LABEL
 from tests.benchmarks.flutter import FORCES_LABEL, KEPT_LABEL, LOCUS_LABEL
-from tests.benchmarks.history import keep
+from tests.benchmarks.history import described, keep
 from tests.benchmarks.numerical_tank import RESOLUTIONS, SIDE_BY_SIDE, label, tank_figures
 from tests.benchmarks.own_twin import STEPS_LABEL
 from tests.benchmarks.reduced_order_model import MEMORY_LABEL, PRODUCT_LABEL, TIME_LABEL, model_figures
@@ -171,11 +171,11 @@ def main() -> None:
     asked = sys.argv[1:] or list(GROUPS)
     if unknown := set(asked) - set(GROUPS):
         sys.exit(f"benchmarks: got {', '.join(sorted(unknown))}; allowed: {', '.join(GROUPS)}")
-    figures: dict[str, float] = {}
+    about, figures = described(), dict[str, float]()
     for name in asked:
         print(f"{name} …", flush=True)
         own = GROUPS[name]()
-        keep(own)  # after each: an interrupted run leaves what it has measured
+        keep(own, about)  # after each: an interrupted run leaves what it has measured
         figures |= own
     sys.exit(1 if printed(figures) else 0)
 

@@ -25,15 +25,20 @@ FIGURE: Final = Path("docs") / "images" / "benchmarks_over_revisions.png"
 _DIGITS: Final = 3
 
 
-def keep(figures: Mapping[str, float], path: Path = RESULTS) -> None:
-    """Write the figures of this run, beside those of other groups at the same revision on the same machine."""
-    about = {"revision": _revision(), "date": _date(), "machine": machine()}
+def described() -> dict[str, str]:
+    """Revision, its date and the machine: asked when a run begins, whatever is committed while it goes on."""
+    revision, date = _of_git("log", "-1", "--abbrev=8", "--format=%h %cs").split(" ")
+    return {"revision": revision, "date": date, "machine": machine()}
+
+
+def keep(figures: Mapping[str, float], about: Mapping[str, str], path: Path = RESULTS) -> None:
+    """Write the figures of a run, beside those of other groups at the same revision on the same machine."""
     known = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
     before = (
         known.get("figures", {}) if all(known.get(key) == about[key] for key in ("revision", "machine")) else {}
     )
     path.parent.mkdir(parents=True, exist_ok=True)
-    text = json.dumps(about | {"figures": {**before, **figures}}, indent=1, ensure_ascii=False)
+    text = json.dumps({**about, "figures": {**before, **figures}}, indent=1, ensure_ascii=False)
     path.write_text(text + "\n", encoding="utf-8")
 
 
@@ -47,17 +52,9 @@ def machine() -> str:
     return f"{name}, {os.cpu_count()} cores, Python {platform.python_version()}, NumPy {np.__version__}"
 
 
-def _revision() -> str:
-    return _of_git("rev-parse", "--short=8", "HEAD")
-
-
-def _date() -> str:
-    return _of_git("log", "-1", "--format=%cs")
-
-
 def _of_git(*words: str) -> str:
     done = subprocess.run(["git", *words], capture_output=True, text=True, check=False)
-    return done.stdout.strip() or "unknown"
+    return done.stdout.strip() or "unknown unknown"
 
 
 def with_entry(history: list[dict[str, Any]], run: Mapping[str, Any]) -> list[dict[str, Any]]:

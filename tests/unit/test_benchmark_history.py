@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.benchmarks.__main__ import AIMS, AT_LEAST, GROUPS
-from tests.benchmarks.history import HISTORY, draw, keep, machine, over_aims, with_entry
+from tests.benchmarks.history import HISTORY, described, draw, keep, machine, over_aims, with_entry
 
 
 def run(revision: str, **figures: float) -> dict[str, object]:
@@ -36,11 +36,15 @@ def test_figures_above_and_below_their_aims_are_told_apart() -> None:
 
 def test_a_run_is_kept_with_its_machine_and_groups_are_joined(tmp_path: Path) -> None:
     path = tmp_path / "results" / "bench.json"
-    keep({"x": 1.0}, path)
-    keep({"y": 2.0}, path)
+    about = {"revision": "a", "date": "2026-01-01", "machine": machine()}
+    keep({"x": 1.0}, about, path)
+    keep({"y": 2.0}, about, path)
     found = json.loads(path.read_text(encoding="utf-8"))
     assert found["figures"] == {"x": 1.0, "y": 2.0}
-    assert found["machine"] == machine() and "cores" in found["machine"]
+    assert "cores" in found["machine"]
+    keep({"z": 3.0}, about | {"revision": "b"}, path)
+    assert json.loads(path.read_text(encoding="utf-8"))["figures"] == {"z": 3.0}
+    assert all(described().values())
 
 
 def test_the_kept_history_knows_every_aim_that_it_is_drawn_with(tmp_path: Path) -> None:
