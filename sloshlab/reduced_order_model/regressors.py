@@ -24,7 +24,7 @@ class Delays:
     Attributes
     ----------
     inputs : tuple of int
-        x(k − d) for each d ≥ 0.
+        x(k − d) for each d ≥ 0; may be empty where there are states.
     outputs : tuple of int
         y(k − d) for each d ≥ 1; empty for a model without feedback.
     n_states : int
@@ -41,7 +41,7 @@ class Delays:
             if wrong or len(set(delays)) != len(delays):
                 got = f"{wrong[0]}" if wrong else "a delay twice"
                 raise InputError(what, got=got, allowed=f"different whole numbers {least} … {MOST_DELAYS}")
-        if not self.inputs:
+        if not self.inputs and not self.n_states:
             raise InputError("input delays", got="none", allowed="at least one")
         if not 0 <= self.n_states <= MOST_DELAYS or (self.n_states and self.outputs):
             got = f"{self.n_states} states, {len(self.outputs)} output delays"
@@ -75,14 +75,14 @@ class Delays:
     def is_one_line(self) -> bool:
         """Whether φ is a stretch of past inputs without holes, and nothing else."""
         # only the moments of a line without holes are correlations of one signal
-        first = self.inputs[0]
-        only_inputs = not self.outputs and not self.n_states
-        return only_inputs and self.inputs == tuple(range(first, first + len(self.inputs)))
+        if self.outputs or self.n_states:
+            return False
+        return self.inputs == tuple(range(self.inputs[0], self.inputs[0] + len(self.inputs)))
 
     @property
     def longest(self) -> int:
         """Samples that a model must have seen."""
-        return max((*self.inputs, *self.outputs))
+        return max((*self.inputs, *self.outputs), default=0)
 
 
 @dataclass(frozen=True)

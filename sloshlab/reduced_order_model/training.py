@@ -20,6 +20,7 @@ from sloshlab.reduced_order_model.least_squares import LeastSquaresProblem, OneS
 from sloshlab.reduced_order_model.model import ReducedOrderModel, Scaling, feedback_model, scaled_run
 from sloshlab.reduced_order_model.network_list import network_of
 from sloshlab.reduced_order_model.networks.network import Network, NormalSums
+from sloshlab.reduced_order_model.principal_regressors import NetworkOfDistances, along, principal_directions
 from sloshlab.reduced_order_model.regressors import Delays, Run, blocks, n_samples, segments
 
 FloatArray = NDArray[np.float64]
@@ -190,6 +191,7 @@ def fit(
         scaling.output_scale,
         backend or array_backend(),
     )
+    task, basis = _with_fewer_regressors(task)
     best, started, interrupted = _Best(), time.monotonic(), False
     try:
         for start in range(chosen.n_starts):
@@ -202,8 +204,32 @@ def fit(
     if best.theta is None or best.epoch is None:
         raise AnalysisError("training", got="no stable model from any start", remedy="fewer output delays")
     ended = "interrupted" if interrupted else best.ended
-    model = ReducedOrderModel(network, best.theta, delays, scaling, sampling_rate_hz, agitation=agitation)
+    theta = best.theta if basis is None else network.lifted(best.theta, basis)  # type: ignore[attr-defined]
+    model = ReducedOrderModel(network, theta, delays, scaling, sampling_rate_hz, agitation=agitation)
     return model, TrainingRecord(best.epochs, best.epoch, ended, interrupted)
+
+
+def _with_fewer_regressors(task: _Task) -> tuple[_Task, FloatArray | None]:
+    """The task along the directions in which its regressors vary, where these are few; their basis."""
+    # a model that runs free feeds its outputs back one by one, which has no other directions
+    if task.delays.outputs or not isinstance(task.network, NetworkOfDistances):
+        return task, None
+    basis = principal_directions(task.training, task.delays)
+    n_directions = basis.shape[1]
+    # beyond half of them the sums of a delay line by correlations cost less
+    if 2 * n_directions > task.delays.n_regressors:
+        return task, None
+    training, validation = (
+        [along(basis, run, task.delays) for run in runs] for runs in (task.training, task.validation)
+    )
+    fewer = replace(
+        task,
+        network=task.network.along(n_directions),
+        delays=Delays((), n_states=n_directions),
+        training=training,
+        validation=validation,
+    )
+    return fewer, basis
 
 
 def _train_once(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -68,6 +68,18 @@ class _RadialBasisNetwork:
         """Centres, shape (n_neurons, n_inputs), and linear parameters."""
         n = self.n_neurons * self.n_inputs
         return xp.reshape(theta[:n], (self.n_neurons, self.n_inputs)), theta[n:]
+
+    def along(self, n_directions: int) -> Self:
+        """The network of so many regressors, with as many neurons."""
+        return replace(self, n_inputs=n_directions)
+
+    def lifted(self, theta: FloatArray, basis: FloatArray) -> FloatArray:
+        """Parameters for all regressors out of those along a basis, shape (n_inputs, n_directions).
+
+        Distances stay the same but for what lies across the basis, which all centres have in common.
+        """
+        centres, linear = self.along(basis.shape[1]).parts(np, theta)
+        return np.concatenate([(centres @ basis.T).ravel(), linear])
 
     @abstractmethod
     def linear_features(self, xp: Any, theta: Array, phi: Array) -> Array:
