@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -54,19 +54,31 @@ class OneStepProblem:
         Returns an iterator over (regressors, outputs), the same at every call.
     is_delay_line : bool
         Whether the regressors are past values of one signal, in order.
+    n_alike : int
+        So many parameters in a row, of those that are not linear, are damped by the mean of their squares: the
+        coordinates of a centre whose directions are of no size in common. By their own squares those along
+        which regressors hardly vary would be damped hardly at all.
     """
 
     backend: ArrayBackend
     network: Network
     blocks: Callable[[], Iterator[tuple[Any, Any]]]
     is_delay_line: bool = False
+    n_alike: int = 1
 
     def normal_sums(self, theta: Array) -> NormalSums:
         """Return Σ J Jᵀ, Σ J e, Σ e²."""
         sums = self.network.normal_sums(self.backend.xp, theta, is_delay_line=self.is_delay_line)
         for phi, target in self.blocks():
             sums.add(self.backend.asarray(phi), self.backend.asarray(target))
-        return sums.sums()
+        found = sums.sums()
+        return found if self.n_alike == 1 else replace(found, scale=self._scale(found.matrix))
+
+    def _scale(self, matrix: Array) -> Array:
+        xp, n = self.backend.xp, self.network.n_parameters - self.network.n_linear
+        diagonal = xp.linalg.diagonal(matrix)
+        means = xp.mean(xp.reshape(diagonal[:n], (-1, self.n_alike)), axis=1)
+        return xp.concat([xp.repeat(means, self.n_alike), diagonal[n:]])
 
     def improved(self, theta: Array) -> tuple[Array, float]:
         """Return θ with the best linear parameters, and Σ e²."""
@@ -126,7 +138,7 @@ def next_step(problem: LeastSquaresProblem, at: Step, xp: Any) -> Step | None:
     """
     # the dear part, once per epoch: ten times a trial of λ
     sums = problem.normal_sums(at.theta)
-    diagonal = xp.linalg.diagonal(sums.matrix)
+    diagonal = xp.linalg.diagonal(sums.matrix) if sums.scale is None else sums.scale
     # Marquardt's scaling: parameters of different size are damped alike
     scale = xp.maximum(diagonal, _FLOOR * xp.max(diagonal))
 

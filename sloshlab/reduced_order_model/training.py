@@ -248,7 +248,11 @@ def _train_once(
     is_line = task.delays.is_one_line
     size = _LINE_BLOCK if is_line else BLOCK
     one_step = OneStepProblem(
-        task.backend, task.network, lambda: blocks(task.training, task.delays, size), is_line
+        task.backend,
+        task.network,
+        lambda: blocks(task.training, task.delays, size),
+        is_line,
+        n_alike=1 if task.delays.inputs else task.network.n_inputs,
     )
     # NOE starts from a trained NARX, as in the source (2.2)
     stages: list[tuple[LeastSquaresProblem, ArrayBackend]] = [(one_step, task.backend)]

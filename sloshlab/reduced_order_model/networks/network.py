@@ -29,11 +29,14 @@ class NormalSums:
         Σ J e.
     squares : float
         Σ e².
+    scale : array, shape (n_parameters,), optional
+        By which parameters are damped; the diagonal of the matrix if not given.
     """
 
     matrix: Array
     gradient: Array
     squares: float
+    scale: Array | None = None
 
 
 class NormalSumsSoFar(Protocol):
