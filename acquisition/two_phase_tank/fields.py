@@ -1,0 +1,143 @@
+"""What the compiled loops take: the state, the constants and room for what they compute on the way.
+
+Cells are numbered [i, k] along x and z. u is on the faces between [i - 1, k] and [i, k], w on those between
+[i, k - 1] and [i, k]; the first and the last are walls, where they are zero.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+class State(NamedTuple):
+    """What a later step depends on.
+
+    Attributes
+    ----------
+    c : ndarray, shape (nx, nz)
+        Volume fraction of the liquid.
+    u, w : ndarray, shape (nx + 1, nz) and (nx, nz + 1)
+        Velocities relative to the tank [m/s], without divergence.
+    p : ndarray, shape (nx, nz)
+        Pressure of the last step [Pa]; where the search for the next one begins.
+    roll : ndarray, shape (2,)
+        Angle [rad] and rate [rad/s] of the tank, from x towards z.
+    """
+
+    c: FloatArray
+    u: FloatArray
+    w: FloatArray
+    p: FloatArray
+    roll: FloatArray
+
+
+class Constants(NamedTuple):
+    """Physical and numerical constants, in SI units.
+
+    Attributes
+    ----------
+    dx, dz : float
+        Sides of a cell.
+    rho_l, rho_g, mu_l, mu_g : float
+        Densities and dynamic viscosities of liquid and gas.
+    sigma, gravity : float
+        Surface tension and g.
+    drag : float
+        Rate [1/s] at which the walls before and behind the computed plane slow the liquid down; 0 without them.
+    slip : float
+        1 where the walls do not hold the fluids, 0 where they do.
+    cot_advancing, cot_receding : float
+        Cotangents of the contact angles between which a contact line is free: slopes with which the liquid
+        rises at a wall.
+    courant : float
+        Largest sum of the volumes that leave a cell in a step, over its volume.
+    tolerance : float
+        Root mean square of the volume that a step may make in a cell, over its volume.
+    n_most : float
+        Most iterations for the pressure.
+    """
+
+    dx: float
+    dz: float
+    rho_l: float
+    rho_g: float
+    mu_l: float
+    mu_g: float
+    sigma: float
+    gravity: float
+    drag: float
+    slip: float
+    cot_advancing: float
+    cot_receding: float
+    courant: float
+    tolerance: float
+    n_most: float
+
+
+class Work(NamedTuple):
+    """Room for one step.
+
+    Attributes
+    ----------
+    mx, mz, alpha : ndarray, shape (nx, nz)
+        Interface m·x = α of mixed cells in units of the cell, m pointing out of the liquid, |mx| + |mz| = 1.
+    rho : ndarray, shape (nx, nz)
+        Density.
+    centre : ndarray, shape (nx, nz)
+        1 where a cell was more than half full at the start of the step.
+    kappa : ndarray, shape (nx, nz)
+        Curvature of the interface [1/m], positive for a drop.
+    smooth : ndarray, shape (nx, nz)
+        Volume fraction averaged over neighbours.
+    vx, lx, fx : ndarray, shape (nx + 1, nz)
+        Volume, liquid and mass through the faces in a step, over a cell's volume.
+    vz, lz, fz : ndarray, shape (nx, nz + 1)
+        The same in z.
+    u0, w0 : ndarray
+        Velocities before.
+    us, ws : ndarray
+        Changes of velocity by the interface (curvature and its place between the points of the grid).
+    uv, wv : ndarray
+        Changes of velocity by viscosity and walls.
+    bx, bz : ndarray
+        1/ρ on the faces.
+    """
+
+    mx: FloatArray
+    mz: FloatArray
+    alpha: FloatArray
+    rho: FloatArray
+    centre: FloatArray
+    kappa: FloatArray
+    smooth: FloatArray
+    vx: FloatArray
+    lx: FloatArray
+    fx: FloatArray
+    vz: FloatArray
+    lz: FloatArray
+    fz: FloatArray
+    u0: FloatArray
+    w0: FloatArray
+    us: FloatArray
+    ws: FloatArray
+    uv: FloatArray
+    wv: FloatArray
+    bx: FloatArray
+    bz: FloatArray
+
+
+def room(nx: int, nz: int) -> Work:
+    """Return room for a grid of nx × nz cells.
+
+    Parameters
+    ----------
+    nx, nz : int
+    """
+    cells, along, up = (nx, nz), (nx + 1, nz), (nx, nz + 1)
+    shapes = [*[cells] * 7, *[along] * 3, *[up] * 3, *[along, up] * 4]
+    return Work(*(np.zeros(shape) for shape in shapes))

@@ -1,0 +1,250 @@
+"""What the interface does to the velocities: curvature, and where it lies between the points of the grid.
+
+Both are jumps of the pressure across the interface: σκ by surface tension, and Δρ (a⃗·Δr⃗) because the grid puts the
+change of density on a face and the interface is Δr⃗ away from it (a⃗ is the body force per mass). A force J ∂C/∂x on
+the face is then in balance with the pressure of a liquid at rest to rounding (Francois et al. 2006).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from acquisition.two_phase_tank.reconstruction import EMPTY, line_ends
+
+_REACH = 5
+"""Cells that a column may be followed in search of its height."""
+_FULL = 1e-6
+_UNKNOWN = 1e9
+
+
+@njit(cache=True, error_model="numpy")
+def _height(c, i, k, along_z, sign):  # type: ignore[no-untyped-def]
+    """Height of the liquid in the column (or row) of a cell, from the middle of the cell, in cells.
+
+    Positive along the normal that `sign` tells; `_UNKNOWN` where the column is not full below and empty above.
+    """
+    nx, nz = c.shape
+    n, at = (nz, k) if along_z else (nx, i)
+    height, last, least, most = -0.5, 1.0, 1.0, 0.0
+    for step in range(_REACH + 1):
+        place = at + sign * step
+        # beyond a wall there is gas above a film of gas, and liquid below a film of liquid
+        f = 0.0 if place < 0 or place >= n else (c[i, place] if along_z else c[place, k])
+        if (step > 0 and f > last + 1e-3) or (step == _REACH and f > _FULL):
+            return _UNKNOWN
+        height += f
+        last = f
+        if 0 <= place < n:
+            least, most = min(least, f), max(most, f)
+        if f <= _FULL:
+            break
+    last = c[i, k]
+    for step in range(1, _REACH + 1):
+        if last >= 1.0 - _FULL:
+            break
+        place = at - sign * step
+        f = 1.0 if place < 0 or place >= n else (c[i, place] if along_z else c[place, k])
+        if f < last - 1e-3 or (step == _REACH and f < 1.0 - _FULL):
+            return _UNKNOWN
+        height -= 1.0 - f
+        last = f
+        if 0 <= place < n:
+            least, most = min(least, f), max(most, f)
+    # a column without any gas, or without any liquid, between two walls has no interface
+    return height if least < 1.0 - EMPTY and most > EMPTY else _UNKNOWN
+
+
+@njit(cache=True, error_model="numpy")
+def _curvature_of_heights(c, i, k, along_z, sign, k_):  # type: ignore[no-untyped-def]
+    """κ from three heights, or `_UNKNOWN`."""
+    nx, nz = c.shape
+    across, up = (k_.dx, k_.dz) if along_z else (k_.dz, k_.dx)
+    ratio = across / up
+    di, dk = (1, 0) if along_z else (0, 1)
+    middle = _height(c, i, k, along_z, sign)
+    has_right, has_left = i + di < nx and k + dk < nz, i - di >= 0 and k - dk >= 0
+    right = _height(c, i + di, k + dk, along_z, sign) if has_right else 0.0
+    left = _height(c, i - di, k - dk, along_z, sign) if has_left else 0.0
+    if max(middle, left, right) >= _UNKNOWN:
+        return _UNKNOWN
+    # behind a wall is the height that gives the contact angle; free between the angles, the line goes on as it is
+    if not has_right:
+        right = middle + min(max((middle - left) / ratio, k_.cot_advancing), k_.cot_receding) * ratio
+    if not has_left:
+        left = middle + min(max((middle - right) / ratio, k_.cot_advancing), k_.cot_receding) * ratio
+    slope = 0.5 * (right - left) / ratio
+    bend = (right - 2.0 * middle + left) * up / (across * across)
+    return -bend / (1.0 + slope * slope) ** 1.5
+
+
+@njit(cache=True, error_model="numpy")
+def _smooth(c, out):  # type: ignore[no-untyped-def]
+    """Volume fractions averaged over nine cells, mirrored at the walls."""
+    nx, nz = c.shape
+    for i in range(nx):
+        il, ir = max(i - 1, 0), min(i + 1, nx - 1)
+        for k in range(nz):
+            kl, kr = max(k - 1, 0), min(k + 1, nz - 1)
+            out[i, k] = (
+                0.25 * c[i, k]
+                + 0.125 * (c[il, k] + c[ir, k] + c[i, kl] + c[i, kr])
+                + 0.0625 * (c[il, kl] + c[il, kr] + c[ir, kl] + c[ir, kr])
+            )
+
+
+@njit(cache=True, error_model="numpy")
+def _corner_normal(s, i, k, k_):  # type: ignore[no-untyped-def]
+    """Unit vector out of the liquid at the corner between cells i, i + 1 and k, k + 1."""
+    nx, nz = s.shape
+    i0, i1 = max(i, 0), min(i + 1, nx - 1)
+    k0, k1 = max(k, 0), min(k + 1, nz - 1)
+    gx = -0.5 * (s[i1, k0] + s[i1, k1] - s[i0, k0] - s[i0, k1]) / k_.dx
+    gz = -0.5 * (s[i0, k1] + s[i1, k1] - s[i0, k0] - s[i1, k0]) / k_.dz
+    size = np.sqrt(gx * gx + gz * gz)
+    if size * k_.dx < 1e-6:
+        return 0.0, 0.0
+    return gx / size, gz / size
+
+
+@njit(cache=True, error_model="numpy")
+def _curvature_of_normals(s, i, k, k_):  # type: ignore[no-untyped-def]
+    """κ = ∇·n of the averaged fractions: for drops and sheets that have no heights."""
+    x00, z00 = _corner_normal(s, i - 1, k - 1, k_)
+    x10, z10 = _corner_normal(s, i, k - 1, k_)
+    x01, z01 = _corner_normal(s, i - 1, k, k_)
+    x11, z11 = _corner_normal(s, i, k, k_)
+    kappa = 0.5 * (x10 + x11 - x00 - x01) / k_.dx + 0.5 * (z01 + z11 - z00 - z10) / k_.dz
+    # no rounder than a cell
+    most = 1.0 / k_.dx
+    return min(max(kappa, -most), most)
+
+
+@njit(cache=True, error_model="numpy")
+def is_interface(c, i, k):  # type: ignore[no-untyped-def]
+    """Whether a cell is mixed, or full beside an empty one."""
+    nx, nz = c.shape
+    f = c[i, k]
+    if f <= EMPTY:
+        return False
+    if f < 1.0 - EMPTY:
+        return True
+    return (
+        (i > 0 and c[i - 1, k] <= EMPTY)
+        or (i < nx - 1 and c[i + 1, k] <= EMPTY)
+        or (k > 0 and c[i, k - 1] <= EMPTY)
+        or (k < nz - 1 and c[i, k + 1] <= EMPTY)
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def find_curvature(c, work, k_):  # type: ignore[no-untyped-def]
+    """κ of all cells of the interface; `_UNKNOWN` elsewhere."""
+    nx, nz = c.shape
+    _smooth(c, work.smooth)
+    for i in range(nx):
+        for k in range(nz):
+            work.kappa[i, k] = _UNKNOWN
+            if not is_interface(c, i, k):
+                continue
+            mx, mz = work.mx[i, k], work.mz[i, k]
+            if c[i, k] >= 1.0 - EMPTY:
+                s = work.smooth
+                mx = s[max(i - 1, 0), k] - s[min(i + 1, nx - 1), k]
+                mz = s[i, max(k - 1, 0)] - s[i, min(k + 1, nz - 1)]
+            first = abs(mz) >= abs(mx)
+            kappa = _curvature_of_heights(c, i, k, first, 1 if (mz if first else mx) > 0.0 else -1, k_)
+            if kappa >= _UNKNOWN:
+                kappa = _curvature_of_heights(c, i, k, not first, 1 if (mx if first else mz) > 0.0 else -1, k_)
+            if kappa >= _UNKNOWN:
+                kappa = _curvature_of_normals(work.smooth, i, k, k_)
+            work.kappa[i, k] = min(max(kappa, -2.0 / k_.dx), 2.0 / k_.dx)
+
+
+@njit(cache=True, error_model="numpy")
+def _between(a, b):  # type: ignore[no-untyped-def]
+    """Mean of the curvatures of two cells, of those that are known."""
+    if a < _UNKNOWN and b < _UNKNOWN:
+        return 0.5 * (a + b)
+    if a < _UNKNOWN:
+        return a
+    return b if b < _UNKNOWN else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _offset(work, c, i, k, axis):  # type: ignore[no-untyped-def]
+    """Place of the middle of the line from the middle of a mixed cell along an axis, in cells; and whether it is."""
+    if EMPTY < c[i, k] < 1.0 - EMPTY:
+        x1, z1, x2, z2 = line_ends(work.mx[i, k], work.mz[i, k], work.alpha[i, k])
+        return (0.5 * (x1 + x2) - 0.5 if axis == 0 else 0.5 * (z1 + z2) - 0.5), True
+    return 0.0, False
+
+
+@njit(cache=True, error_model="numpy")
+def _place(work, c, i, k, j, m, axis):  # type: ignore[no-untyped-def]
+    """Place of the interface from the face between cells [i, k] and [j, m], along an axis, in cells."""
+    across = (j - i) if axis == 0 else (m - k)
+    first, is_first = _offset(work, c, i, k, axis)
+    second, is_second = _offset(work, c, j, m, axis)
+    if is_first and is_second:
+        # both within a cell of the face
+        return 0.5 * (first - 0.5 * across + second + 0.5 * across)
+    if is_first:
+        return first - 0.5 * across
+    return second + 0.5 * across if is_second else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def interface_forces(state, work, body, k_):  # type: ignore[no-untyped-def]
+    """Accelerations us, ws by the interface; the body force per mass at [x, z] is body[0:2] and its rates."""
+    c = state.c
+    nx, nz = c.shape
+    us, ws = work.us, work.ws
+    us[:], ws[:] = 0.0, 0.0
+    jump = k_.rho_l - k_.rho_g
+    if k_.sigma > 0.0:
+        find_curvature(c, work, k_)
+    for i in range(1, nx):
+        for k in range(nz):
+            difference = c[i, k] - c[i - 1, k]
+            if difference != 0.0:
+                kappa = _between(work.kappa[i - 1, k], work.kappa[i, k]) if k_.sigma > 0.0 else 0.0
+                along = _place(work, c, i - 1, k, i, k, 0) * k_.dx
+                up = _place(work, c, i - 1, k, i, k, 1) * k_.dz
+                ax, az = body_at(body, i * k_.dx, (k + 0.5) * k_.dz)
+                pressure = k_.sigma * kappa - jump * (ax * along + az * up)
+                us[i, k] = pressure * difference / k_.dx * work.bx[i, k]
+    for i in range(nx):
+        for k in range(1, nz):
+            difference = c[i, k] - c[i, k - 1]
+            if difference != 0.0:
+                kappa = _between(work.kappa[i, k - 1], work.kappa[i, k]) if k_.sigma > 0.0 else 0.0
+                along = _place(work, c, i, k - 1, i, k, 0) * k_.dx
+                up = _place(work, c, i, k - 1, i, k, 1) * k_.dz
+                ax, az = body_at(body, (i + 0.5) * k_.dx, k * k_.dz)
+                pressure = k_.sigma * kappa - jump * (ax * along + az * up)
+                ws[i, k] = pressure * difference / k_.dz * work.bz[i, k]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def body_at(body, x, z):  # type: ignore[no-untyped-def]
+    """Force per mass at a place: (fx, fz, ∂fx/∂x = ∂fz/∂z, ∂fx/∂z = −∂fz/∂x, x and z of the turning point)."""
+    x, z = x - body[4], z - body[5]
+    return body[0] + body[2] * x + body[3] * z, body[1] + body[2] * z - body[3] * x
+
+
+@njit(cache=True, error_model="numpy")
+def interface_length(state, work, k_):  # type: ignore[no-untyped-def]
+    """Length of the interface [m]; lines must have been found."""
+    c = state.c
+    nx, nz = c.shape
+    length = 0.0
+    for i in range(nx):
+        for k in range(nz):
+            if EMPTY < c[i, k] < 1.0 - EMPTY:
+                x1, z1, x2, z2 = line_ends(work.mx[i, k], work.mz[i, k], work.alpha[i, k])
+                length += np.sqrt(((x1 - x2) * k_.dx) ** 2 + ((z1 - z2) * k_.dz) ** 2)
+            elif c[i, k] >= 1.0 - EMPTY:
+                length += k_.dz * ((i > 0 and c[i - 1, k] <= EMPTY) + (i < nx - 1 and c[i + 1, k] <= EMPTY))
+                length += k_.dx * ((k > 0 and c[i, k - 1] <= EMPTY) + (k < nz - 1 and c[i, k + 1] <= EMPTY))
+    return length
