@@ -11,6 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.two_phase_tank.multigrid import Level, Search
+
 FloatArray = NDArray[np.float64]
 
 
@@ -43,6 +45,8 @@ class Constants(NamedTuple):
     ----------
     dx, dz : float
         Sides of a cell.
+    middle_x, middle_z : float
+        Of the box.
     rho_l, rho_g, mu_l, mu_g : float
         Densities and dynamic viscosities of liquid and gas.
     sigma, gravity : float
@@ -64,6 +68,8 @@ class Constants(NamedTuple):
 
     dx: float
     dz: float
+    middle_x: float
+    middle_z: float
     rho_l: float
     rho_g: float
     mu_l: float
@@ -129,6 +135,32 @@ class Work(NamedTuple):
     wv: FloatArray
     bx: FloatArray
     bz: FloatArray
+
+
+class Flow(NamedTuple):
+    """Everything that a step takes and changes.
+
+    Attributes
+    ----------
+    state : State
+    work : Work
+    constants : Constants
+    grids : tuple of Level
+    search : Search
+        Of the pressure.
+    sums : ndarray
+        In the order of `energy.TERMS`.
+    counters : ndarray of int, shape (2,)
+        Steps and parts of steps since the start.
+    """
+
+    state: State
+    work: Work
+    constants: Constants
+    grids: tuple[Level, ...]
+    search: Search
+    sums: FloatArray
+    counters: NDArray[np.int64]
 
 
 def room(nx: int, nz: int) -> Work:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from acquisition.numerical_tank.instability import InstabilityError
 from acquisition.two_phase_tank import energy, stepping
 from acquisition.two_phase_tank.energy import TwoPhaseAccount
-from acquisition.two_phase_tank.fields import Constants, State, room
+from acquisition.two_phase_tank.fields import Constants, Flow, State, room
 from acquisition.two_phase_tank.multigrid import hierarchy
 from acquisition.two_phase_tank.setup import TwoPhaseSetup
 from acquisition.two_phase_tank.transport import find_density
@@ -74,10 +74,12 @@ class TwoPhaseTank:
             np.zeros(2),
         )
         self._work = room(nx, nz)
-        self._grids = hierarchy(nx, nz)
         self._sums = np.zeros(len(energy.TERMS))
         # arrays and no numbers: the compiled loops add to them, and a checkpoint copies them
         self._counters = np.zeros(2, np.int64)
+        self._flow = Flow(
+            self._state, self._work, self._constants, *hierarchy(nx, nz), self._sums, self._counters
+        )
         self._begin()
 
     def _begin(self) -> None:
@@ -160,19 +162,7 @@ class TwoPhaseTank:
         motion = _as_motion(acceleration_m_per_s2)
         forces = np.zeros((motion.shape[0], 2))
         before = self.n_steps
-        status = int(
-            stepping.advance(
-                self._state,
-                self._work,
-                self._grids,
-                motion,
-                self.setup.step_s,
-                forces,
-                self._constants,
-                self._sums,
-                self._counters,
-            )
-        )
+        status = stepping.advance(self._flow, motion, self.setup.step_s, forces)
         if status != stepping.RUNNING:
             done = self._as_forces(forces[: self.n_steps - before])
             raise InstabilityError(_REASONS[status], self.time_s, self._fastest_place(), done)
@@ -282,6 +272,8 @@ def constants_of(setup: TwoPhaseSetup) -> Constants:
     return Constants(
         dx,
         dz,
+        0.5 * setup.box.length_m,
+        0.5 * setup.box.height_m,
         fluids.density_kg_per_m3,
         fluids.gas_density_kg_per_m3,
         fluids.density_kg_per_m3 * max(fluids.viscosity_m2_per_s, 1e-30),

@@ -15,6 +15,7 @@ import math
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from acquisition.two_phase_tank.energy import (
     CARRIED,
@@ -29,14 +30,19 @@ from acquisition.two_phase_tank.energy import (
     TANK_WORK,
     VISCOSITY,
 )
+from acquisition.two_phase_tank.fields import Constants, Flow
 from acquisition.two_phase_tank.multigrid import set_coefficients, solve
 from acquisition.two_phase_tank.reconstruction import reconstruct
 from acquisition.two_phase_tank.surface import body_at, interface_forces, interface_length
 from acquisition.two_phase_tank.transport import transport
 from acquisition.two_phase_tank.viscosity import viscous_changes
 
+FloatArray = NDArray[np.float64]
+
 RUNNING, NO_PRESSURE, TOO_FAST = 0, 1, 2
 """How a number of steps ended."""
+STEPS_DONE, PARTS_DONE = range(2)
+"""Entries of the counters."""
 MOST_PARTS = 2000
 """Parts of a step beyond which a run is given up."""
 
@@ -90,7 +96,7 @@ def stored_energy(state, work, k_):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _longest_part(state, k_):  # type: ignore[no-untyped-def]
+def longest_part(state, k_):  # type: ignore[no-untyped-def]
     """Time in which a cell loses the share of its volume that it may."""
     u, w = state.u, state.w
     nx, nz = state.c.shape
@@ -103,18 +109,12 @@ def _longest_part(state, k_):  # type: ignore[no-untyped-def]
     return k_.courant / fastest if fastest > 0.0 else math.inf
 
 
-@njit(cache=True, error_model="numpy")
-def _body(acceleration, roll, gravity, middle_x, middle_z):  # type: ignore[no-untyped-def]
-    """Force per mass in the frame of the tank: at the middle, its rates over x and z, and the middle."""
-    sine, cosine = math.sin(roll[0]), math.cos(roll[0])
-    return (
-        -acceleration[0] - gravity * sine,
-        -acceleration[1] - gravity * cosine,
-        roll[1] * roll[1],
-        acceleration[2],
-        middle_x,
-        middle_z,
-    )
+def _body(acceleration: FloatArray, roll: FloatArray, k_: Constants) -> tuple[float, ...]:
+    """Force per mass in the frame of the tank: at its middle, its rates over x and z, and the middle."""
+    angle, rate = float(roll[0]), float(roll[1])
+    along = -float(acceleration[0]) - k_.gravity * math.sin(angle)
+    up = -float(acceleration[1]) - k_.gravity * math.cos(angle)
+    return along, up, rate * rate, float(acceleration[2]), k_.middle_x, k_.middle_z
 
 
 @njit(cache=True, error_model="numpy")
@@ -155,24 +155,26 @@ def _accelerate(state, work, body, dt, k_):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _project(state, work, grids, dt, k_):  # type: ignore[no-untyped-def]
-    """Take the divergence out; return the iterations, or −1."""
-    u, w, p = state.u, state.w, state.p
-    nx, nz = p.shape
-    levels, search = grids
-    source = work.smooth
+def _find_source(state, work, dt, k_):  # type: ignore[no-untyped-def]
+    """−∇·v⃗*/Δt, into the room for averages."""
+    u, w, source = state.u, state.w, work.smooth
+    nx, nz = source.shape
     for i in range(nx):
         for k in range(nz):
             source[i, k] = -((u[i + 1, k] - u[i, k]) / k_.dx + (w[i, k + 1] - w[i, k]) / k_.dz) / dt
-    set_coefficients(levels, work.bx, work.bz, k_.dx, k_.dz)
-    n = solve(levels, search, source, p, k_.tolerance / (dt * dt), k_.n_most)
+
+
+@njit(cache=True, error_model="numpy")
+def _push(state, work, dt, k_):  # type: ignore[no-untyped-def]
+    """v⃗* − Δt ∇p/ρ."""
+    u, w, p = state.u, state.w, state.p
+    nx, nz = p.shape
     for i in range(1, nx):
         for k in range(nz):
             u[i, k] -= dt * work.bx[i, k] * (p[i, k] - p[i - 1, k]) / k_.dx
     for i in range(nx):
         for k in range(1, nz):
             w[i, k] -= dt * work.bz[i, k] * (p[i, k] - p[i, k - 1]) / k_.dz
-    return n
 
 
 @njit(cache=True, error_model="numpy")
@@ -210,78 +212,9 @@ def _works(state, work, body, acceleration, dt, k_, sums):  # type: ignore[no-un
 
 
 @njit(cache=True, error_model="numpy")
-def _part(state, work, grids, acceleration, dt, x_first, k_, sums):  # type: ignore[no-untyped-def]
-    """One part of a step."""
-    c = state.c
-    nx, nz = c.shape
-    cell = k_.dx * k_.dz
-    before = kinetic_energy(state, work)
-    sums[CLIPPED] += transport(state, work, dt, x_first, k_) * cell
-    sums[CARRIED] += (before - kinetic_energy(state, work)) * cell
-    state.roll[1] += dt * acceleration[2]
-    state.roll[0] += dt * state.roll[1]
-    body = _body(acceleration, state.roll, k_.gravity, 0.5 * nx * k_.dx, 0.5 * nz * k_.dz)
-    _find_volumes(work)
-    reconstruct(c, work)
-    interface_forces(state, work, body, k_)
-    lost, dragged = viscous_changes(state, work, dt, k_)
-    sums[VISCOSITY] += lost
-    sums[DRAG] += dragged
-    _accelerate(state, work, body, dt, k_)
-    n = _project(state, work, grids, dt, k_)
-    if n < 0:
-        return NO_PRESSURE
-    sums[ITERATIONS] += n
-    sums[PARTS] += 1
-    sums[INTERFACE] += _works(state, work, body, acceleration, dt, k_, sums) + lost + dragged
-    return RUNNING
-
-
-@njit(cache=True, error_model="numpy")
-def advance(state, work, grids, motion, step, forces, k_, sums, counters):  # type: ignore[no-untyped-def]
-    """Steps of the tank: motion [n, 3] is its acceleration along, up and in roll; forces [n, 3] come out.
-
-    Forces and the moment about the middle of the box are means over the step, by what the fluids' momentum says.
-    """
-    c = state.c
-    nx, nz = c.shape
-    cell = k_.dx * k_.dz
-    body = np.zeros(2)
-    for j in range(motion.shape[0]):
-        acceleration = motion[j]
-        left = step
-        along0, up0 = momentum(state, work)
-        body[:] = 0.0
-        n_parts = 0
-        while left > 0.0:
-            longest = _longest_part(state, k_)
-            n = max(math.ceil(left / longest), 1) if longest < math.inf else 1
-            if n > MOST_PARTS or not np.isfinite(longest) and longest != math.inf:
-                return TOO_FAST
-            dt = left / n
-            status = _part(state, work, grids, acceleration, dt, counters[1] % 2 == 0, k_, sums)
-            if status != RUNNING:
-                return status
-            fx, fz = body_impulse(state, work, acceleration, k_)
-            body[0] += fx * dt
-            body[1] += fz * dt
-            counters[1] += 1
-            n_parts += 1
-            left = left - dt if n > 1 else 0.0
-            if n_parts > MOST_PARTS:
-                return TOO_FAST
-        along, up = momentum(state, work)
-        forces[j, 0] = (body[0] - (along - along0)) * cell / step
-        forces[j, 1] = (body[1] - (up - up0)) * cell / step
-        counters[0] += 1
-    return RUNNING
-
-
-@njit(cache=True, error_model="numpy")
-def body_impulse(state, work, acceleration, k_):  # type: ignore[no-untyped-def]
+def _body_impulse(state, work, body, k_):  # type: ignore[no-untyped-def]
     """Sum of the body forces on the whole mass, half cells at the walls included."""
     nx, nz = state.c.shape
-    body = _body(acceleration, state.roll, k_.gravity, 0.5 * nx * k_.dx, 0.5 * nz * k_.dz)
     along, up = 0.0, 0.0
     spin = 2.0 * state.roll[1]
     for i in range(nx):
@@ -293,3 +226,79 @@ def body_impulse(state, work, acceleration, k_):  # type: ignore[no-untyped-def]
             along += work.rho[i, k] * fx
             up += work.rho[i, k] * fz
     return along, up
+
+
+def part(flow: Flow, acceleration: FloatArray, dt: float) -> tuple[int, FloatArray]:
+    """Take one part of a step; return how it ended, and the body forces on all fluid [N/m].
+
+    Parameters
+    ----------
+    flow : Flow
+        Changed.
+    acceleration : ndarray, shape (3,)
+        Of the tank along, up and in roll.
+    dt : float
+        Duration [s].
+    """
+    state, work, k_, sums = flow.state, flow.work, flow.constants, flow.sums
+    cell = k_.dx * k_.dz
+    before = kinetic_energy(state, work)
+    # the direction that comes first changes from part to part, so that none is preferred
+    sums[CLIPPED] += transport(state, work, dt, flow.counters[PARTS_DONE] % 2 == 0, k_) * cell
+    sums[CARRIED] += (before - kinetic_energy(state, work)) * cell
+    state.roll[1] += dt * acceleration[2]
+    state.roll[0] += dt * state.roll[1]
+    body = _body(acceleration, state.roll, k_)
+    _find_volumes(work)
+    reconstruct(state.c, work)
+    interface_forces(state, work, body, k_)
+    lost, dragged = viscous_changes(state, work, dt, k_)
+    _accelerate(state, work, body, dt, k_)
+    _find_source(state, work, dt, k_)
+    set_coefficients(flow.grids, work.bx, work.bz, k_.dx, k_.dz)
+    n = solve(flow.grids, flow.search, work.smooth, state.p, k_.tolerance / (dt * dt), k_.n_most)
+    if n < 0:
+        return NO_PRESSURE, np.zeros(2)
+    _push(state, work, dt, k_)
+    sums[VISCOSITY] += lost
+    sums[DRAG] += dragged
+    sums[ITERATIONS] += n
+    sums[PARTS] += 1
+    sums[INTERFACE] += _works(state, work, body, acceleration, dt, k_, sums) + lost + dragged
+    flow.counters[PARTS_DONE] += 1
+    return RUNNING, np.array(_body_impulse(state, work, body, k_)) * cell
+
+
+def advance(flow: Flow, motion: FloatArray, step_s: float, forces: FloatArray) -> int:
+    """Take a step for each row of the motion; return how it ended.
+
+    Parameters
+    ----------
+    flow : Flow
+        Changed.
+    motion : ndarray, shape (n, 3)
+        Acceleration of the tank along, up and in roll.
+    step_s : float
+    forces : ndarray, shape (n, 2)
+        Comes out: mean force on the tank over each step per depth, by what the momentum of the fluids says.
+    """
+    state, work, k_ = flow.state, flow.work, flow.constants
+    cell = k_.dx * k_.dz
+    for acceleration, force in zip(motion, forces, strict=True):
+        before = np.array(momentum(state, work)) * cell
+        impulse, left, n_parts = np.zeros(2), step_s, 1
+        while n_parts > 0:
+            share = left / longest_part(state, k_)
+            if not share < MOST_PARTS:
+                return TOO_FAST
+            n_parts = max(math.ceil(share), 1)
+            dt = left / n_parts
+            status, push = part(flow, acceleration, dt)
+            if status != RUNNING:
+                return status
+            impulse += push * dt
+            left -= dt
+            n_parts -= 1
+        force[:] = (impulse - np.array(momentum(state, work)) * cell + before) / step_s
+        flow.counters[STEPS_DONE] += 1
+    return RUNNING

@@ -226,7 +226,7 @@ def interface_forces(state, work, body, k_):  # type: ignore[no-untyped-def]
                 ws[i, k] = pressure * difference / k_.dz * work.bz[i, k]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy")
 def body_at(body, x, z):  # type: ignore[no-untyped-def]
     """Force per mass at a place: (fx, fz, ∂fx/∂x = ∂fz/∂z, ∂fx/∂z = −∂fz/∂x, x and z of the turning point)."""
     x, z = x - body[4], z - body[5]

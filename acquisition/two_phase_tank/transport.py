@@ -14,7 +14,7 @@ from numba import njit
 from acquisition.two_phase_tank.reconstruction import EMPTY, reconstruct, share_left, share_right
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy")
 def _limited(behind, ahead):  # type: ignore[no-untyped-def]
     """Slope from the differences on both sides: monotonised central (van Leer 1977)."""
     if behind * ahead <= 0.0:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from numba import njit
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy")
 def _viscosity(f, k_):  # type: ignore[no-untyped-def]
     """Harmonic mean of both viscosities for a volume fraction."""
     return k_.mu_l * k_.mu_g / (f * k_.mu_g + (1.0 - f) * k_.mu_l)
