@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.two_phase_tank.multigrid import Level, Search
+from acquisition.two_phase_tank.pressure import Pressure
 
 FloatArray = NDArray[np.float64]
 
@@ -104,6 +104,8 @@ class Work(NamedTuple):
         Volume, liquid and mass through the faces in a step, over a cell's volume.
     vz, lz, fz : ndarray, shape (nx, nz + 1)
         The same in z.
+    ox, oz : ndarray, shape (nx, nz)
+        Middle of the line of a mixed cell from the middle of the cell, in cells.
     u0, w0 : ndarray
         Velocities before.
     us, ws : ndarray
@@ -121,6 +123,8 @@ class Work(NamedTuple):
     centre: FloatArray
     kappa: FloatArray
     smooth: FloatArray
+    ox: FloatArray
+    oz: FloatArray
     vx: FloatArray
     lx: FloatArray
     fx: FloatArray
@@ -145,9 +149,8 @@ class Flow(NamedTuple):
     state : State
     work : Work
     constants : Constants
-    grids : tuple of Level
-    search : Search
-        Of the pressure.
+    pressure : Pressure
+        What finds it.
     sums : ndarray
         In the order of `energy.TERMS`.
     counters : ndarray of int, shape (2,)
@@ -157,8 +160,7 @@ class Flow(NamedTuple):
     state: State
     work: Work
     constants: Constants
-    grids: tuple[Level, ...]
-    search: Search
+    pressure: Pressure
     sums: FloatArray
     counters: NDArray[np.int64]
 
@@ -171,5 +173,5 @@ def room(nx: int, nz: int) -> Work:
     nx, nz : int
     """
     cells, along, up = (nx, nz), (nx + 1, nz), (nx, nz + 1)
-    shapes = [*[cells] * 7, *[along] * 3, *[up] * 3, *[along, up] * 4]
+    shapes = [*[cells] * 9, *[along] * 3, *[up] * 3, *[along, up] * 4]
     return Work(*(np.zeros(shape) for shape in shapes))

@@ -72,8 +72,8 @@ class GridNumerics:
         Standard deviation of the surface at the start, in cells; what the seed decides.
     """
 
-    courant_number: float = 0.4
-    tolerance: float = 1e-7
+    courant_number: float = 0.45
+    tolerance: float = 1e-6
     most_iterations: int = 600
     disturbance: float = 0.01
 

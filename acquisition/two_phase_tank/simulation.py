@@ -16,7 +16,7 @@ from acquisition.numerical_tank.instability import InstabilityError
 from acquisition.two_phase_tank import energy, stepping
 from acquisition.two_phase_tank.energy import TwoPhaseAccount
 from acquisition.two_phase_tank.fields import Constants, Flow, State, room
-from acquisition.two_phase_tank.multigrid import hierarchy
+from acquisition.two_phase_tank.pressure import Pressure
 from acquisition.two_phase_tank.setup import TwoPhaseSetup
 from acquisition.two_phase_tank.transport import find_density
 from sloshlab.errors import InputError
@@ -78,7 +78,12 @@ class TwoPhaseTank:
         # arrays and no numbers: the compiled loops add to them, and a checkpoint copies them
         self._counters = np.zeros(2, np.int64)
         self._flow = Flow(
-            self._state, self._work, self._constants, *hierarchy(nx, nz), self._sums, self._counters
+            self._state,
+            self._work,
+            self._constants,
+            Pressure(nx, nz, *setup.cell_m, setup.numerics.most_iterations),
+            self._sums,
+            self._counters,
         )
         self._begin()
 

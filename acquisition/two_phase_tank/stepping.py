@@ -21,7 +21,6 @@ from acquisition.two_phase_tank.energy import (
     CARRIED,
     CLIPPED,
     DRAG,
-    INTERFACE,
     ITERATIONS,
     PARTS,
     PRESSURE,
@@ -31,7 +30,6 @@ from acquisition.two_phase_tank.energy import (
     VISCOSITY,
 )
 from acquisition.two_phase_tank.fields import Constants, Flow
-from acquisition.two_phase_tank.multigrid import set_coefficients, solve
 from acquisition.two_phase_tank.reconstruction import reconstruct
 from acquisition.two_phase_tank.surface import body_at, interface_forces, interface_length
 from acquisition.two_phase_tank.transport import transport
@@ -182,7 +180,7 @@ def _works(state, work, body, acceleration, dt, k_, sums):  # type: ignore[no-un
     """Add what forces did on the mean of the carried and the new velocities."""
     u, w, p = state.u, state.w, state.p
     nx, nz = state.c.shape
-    along = up = roll = surface = pressure = viscous = 0.0
+    along = up = roll = surface = pressure = 0.0
     for i in range(1, nx):
         for k in range(nz):
             mean = 0.5 * (work.u0[i, k] + u[i, k])
@@ -191,7 +189,6 @@ def _works(state, work, body, acceleration, dt, k_, sums):  # type: ignore[no-un
             fx, _ = body_at(body, i * k_.dx, (k + 0.5) * k_.dz)
             roll += push * (fx + acceleration[0])
             surface += push * work.us[i, k] * dt
-            viscous += push * work.uv[i, k]
             pressure += mean * (p[i, k] - p[i - 1, k]) / k_.dx * dt
     for i in range(nx):
         for k in range(1, nz):
@@ -201,14 +198,12 @@ def _works(state, work, body, acceleration, dt, k_, sums):  # type: ignore[no-un
             _, fz = body_at(body, (i + 0.5) * k_.dx, k * k_.dz)
             roll += push * (fz + acceleration[1] + k_.gravity)
             surface += push * work.ws[i, k] * dt
-            viscous += push * work.wv[i, k]
             pressure += mean * (p[i, k] - p[i, k - 1]) / k_.dz * dt
     cell = k_.dx * k_.dz
     sums[TANK_WORK] -= (acceleration[0] * along + acceleration[1] * up) * cell * dt
     sums[ROLL_WORK] += roll * cell * dt
     sums[SURFACE] += surface * cell
     sums[PRESSURE] += pressure * cell
-    return viscous * cell
 
 
 @njit(cache=True, error_model="numpy")
@@ -255,8 +250,7 @@ def part(flow: Flow, acceleration: FloatArray, dt: float) -> tuple[int, FloatArr
     lost, dragged = viscous_changes(state, work, dt, k_)
     _accelerate(state, work, body, dt, k_)
     _find_source(state, work, dt, k_)
-    set_coefficients(flow.grids, work.bx, work.bz, k_.dx, k_.dz)
-    n = solve(flow.grids, flow.search, work.smooth, state.p, k_.tolerance / (dt * dt), k_.n_most)
+    n = flow.pressure.solve(work.bx, work.bz, work.smooth, state.p, k_.tolerance / (dt * dt))
     if n < 0:
         return NO_PRESSURE, np.zeros(2)
     _push(state, work, dt, k_)
@@ -264,7 +258,7 @@ def part(flow: Flow, acceleration: FloatArray, dt: float) -> tuple[int, FloatArr
     sums[DRAG] += dragged
     sums[ITERATIONS] += n
     sums[PARTS] += 1
-    sums[INTERFACE] += _works(state, work, body, acceleration, dt, k_, sums) + lost + dragged
+    _works(state, work, body, acceleration, dt, k_, sums)
     flow.counters[PARTS_DONE] += 1
     return RUNNING, np.array(_body_impulse(state, work, body, k_)) * cell
 

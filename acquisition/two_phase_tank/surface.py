@@ -56,10 +56,10 @@ def _height(c, i, k, along_z, sign):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _curvature_of_heights(c, i, k, along_z, sign, k_):  # type: ignore[no-untyped-def]
+def _curvature_of_heights(c, i, k, along_z, sign, dx, dz, cot_a, cot_r):  # type: ignore[no-untyped-def]
     """κ from three heights, or `_UNKNOWN`."""
     nx, nz = c.shape
-    across, up = (k_.dx, k_.dz) if along_z else (k_.dz, k_.dx)
+    across, up = (dx, dz) if along_z else (dz, dx)
     ratio = across / up
     di, dk = (1, 0) if along_z else (0, 1)
     middle = _height(c, i, k, along_z, sign)
@@ -70,9 +70,9 @@ def _curvature_of_heights(c, i, k, along_z, sign, k_):  # type: ignore[no-untype
         return _UNKNOWN
     # behind a wall is the height that gives the contact angle; free between the angles, the line goes on as it is
     if not has_right:
-        right = middle + min(max((middle - left) / ratio, k_.cot_advancing), k_.cot_receding) * ratio
+        right = middle + min(max((middle - left) / ratio, cot_a), cot_r) * ratio
     if not has_left:
-        left = middle + min(max((middle - right) / ratio, k_.cot_advancing), k_.cot_receding) * ratio
+        left = middle + min(max((middle - right) / ratio, cot_a), cot_r) * ratio
     slope = 0.5 * (right - left) / ratio
     bend = (right - 2.0 * middle + left) * up / (across * across)
     return -bend / (1.0 + slope * slope) ** 1.5
@@ -94,29 +94,29 @@ def _smooth(c, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _corner_normal(s, i, k, k_):  # type: ignore[no-untyped-def]
+def _corner_normal(s, i, k, dx, dz):  # type: ignore[no-untyped-def]
     """Unit vector out of the liquid at the corner between cells i, i + 1 and k, k + 1."""
     nx, nz = s.shape
     i0, i1 = max(i, 0), min(i + 1, nx - 1)
     k0, k1 = max(k, 0), min(k + 1, nz - 1)
-    gx = -0.5 * (s[i1, k0] + s[i1, k1] - s[i0, k0] - s[i0, k1]) / k_.dx
-    gz = -0.5 * (s[i0, k1] + s[i1, k1] - s[i0, k0] - s[i1, k0]) / k_.dz
+    gx = -0.5 * (s[i1, k0] + s[i1, k1] - s[i0, k0] - s[i0, k1]) / dx
+    gz = -0.5 * (s[i0, k1] + s[i1, k1] - s[i0, k0] - s[i1, k0]) / dz
     size = np.sqrt(gx * gx + gz * gz)
-    if size * k_.dx < 1e-6:
+    if size * dx < 1e-6:
         return 0.0, 0.0
     return gx / size, gz / size
 
 
 @njit(cache=True, error_model="numpy")
-def _curvature_of_normals(s, i, k, k_):  # type: ignore[no-untyped-def]
+def _curvature_of_normals(s, i, k, dx, dz):  # type: ignore[no-untyped-def]
     """κ = ∇·n of the averaged fractions: for drops and sheets that have no heights."""
-    x00, z00 = _corner_normal(s, i - 1, k - 1, k_)
-    x10, z10 = _corner_normal(s, i, k - 1, k_)
-    x01, z01 = _corner_normal(s, i - 1, k, k_)
-    x11, z11 = _corner_normal(s, i, k, k_)
-    kappa = 0.5 * (x10 + x11 - x00 - x01) / k_.dx + 0.5 * (z01 + z11 - z00 - z10) / k_.dz
+    x00, z00 = _corner_normal(s, i - 1, k - 1, dx, dz)
+    x10, z10 = _corner_normal(s, i, k - 1, dx, dz)
+    x01, z01 = _corner_normal(s, i - 1, k, dx, dz)
+    x11, z11 = _corner_normal(s, i, k, dx, dz)
+    kappa = 0.5 * (x10 + x11 - x00 - x01) / dx + 0.5 * (z01 + z11 - z00 - z10) / dz
     # no rounder than a cell
-    most = 1.0 / k_.dx
+    most = 1.0 / dx
     return min(max(kappa, -most), most)
 
 
@@ -138,27 +138,29 @@ def is_interface(c, i, k):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def find_curvature(c, work, k_):  # type: ignore[no-untyped-def]
-    """κ of all cells of the interface; `_UNKNOWN` elsewhere."""
+def find_curvature(c, mx, mz, smooth, kappa, dx, dz, cot_advancing, cot_receding):  # type: ignore[no-untyped-def]
+    """κ of all cells of the interface, into an array that is unknown elsewhere."""
     nx, nz = c.shape
-    _smooth(c, work.smooth)
+    _smooth(c, smooth)
     for i in range(nx):
         for k in range(nz):
-            work.kappa[i, k] = _UNKNOWN
             if not is_interface(c, i, k):
                 continue
-            mx, mz = work.mx[i, k], work.mz[i, k]
+            ax, az = mx[i, k], mz[i, k]
             if c[i, k] >= 1.0 - EMPTY:
-                s = work.smooth
-                mx = s[max(i - 1, 0), k] - s[min(i + 1, nx - 1), k]
-                mz = s[i, max(k - 1, 0)] - s[i, min(k + 1, nz - 1)]
-            first = abs(mz) >= abs(mx)
-            kappa = _curvature_of_heights(c, i, k, first, 1 if (mz if first else mx) > 0.0 else -1, k_)
-            if kappa >= _UNKNOWN:
-                kappa = _curvature_of_heights(c, i, k, not first, 1 if (mx if first else mz) > 0.0 else -1, k_)
-            if kappa >= _UNKNOWN:
-                kappa = _curvature_of_normals(work.smooth, i, k, k_)
-            work.kappa[i, k] = min(max(kappa, -2.0 / k_.dx), 2.0 / k_.dx)
+                ax = smooth[max(i - 1, 0), k] - smooth[min(i + 1, nx - 1), k]
+                az = smooth[i, max(k - 1, 0)] - smooth[i, min(k + 1, nz - 1)]
+            found, along_z = _UNKNOWN, abs(az) >= abs(ax)
+            # along the steeper direction first
+            for _ in range(2):
+                sign = 1 if (az if along_z else ax) > 0.0 else -1
+                found = _curvature_of_heights(c, i, k, along_z, sign, dx, dz, cot_advancing, cot_receding)
+                if found < _UNKNOWN:
+                    break
+                along_z = not along_z
+            if found >= _UNKNOWN:
+                found = _curvature_of_normals(smooth, i, k, dx, dz)
+            kappa[i, k] = min(max(found, -2.0 / dx), 2.0 / dx)
 
 
 @njit(cache=True, error_model="numpy")
@@ -172,58 +174,57 @@ def _between(a, b):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _offset(work, c, i, k, axis):  # type: ignore[no-untyped-def]
-    """Place of the middle of the line from the middle of a mixed cell along an axis, in cells; and whether it is."""
-    if EMPTY < c[i, k] < 1.0 - EMPTY:
-        x1, z1, x2, z2 = line_ends(work.mx[i, k], work.mz[i, k], work.alpha[i, k])
-        return (0.5 * (x1 + x2) - 0.5 if axis == 0 else 0.5 * (z1 + z2) - 0.5), True
-    return 0.0, False
+def _find_places(c, mx, mz, alpha, ox, oz):  # type: ignore[no-untyped-def]
+    """Middles of the lines of mixed cells from the middles of the cells, in cells; far away in all others."""
+    nx, nz = c.shape
+    for i in range(nx):
+        for k in range(nz):
+            ox[i, k] = _UNKNOWN
+            if EMPTY < c[i, k] < 1.0 - EMPTY:
+                x1, z1, x2, z2 = line_ends(mx[i, k], mz[i, k], alpha[i, k])
+                ox[i, k], oz[i, k] = 0.5 * (x1 + x2) - 0.5, 0.5 * (z1 + z2) - 0.5
 
 
 @njit(cache=True, error_model="numpy")
-def _place(work, c, i, k, j, m, axis):  # type: ignore[no-untyped-def]
-    """Place of the interface from the face between cells [i, k] and [j, m], along an axis, in cells."""
-    across = (j - i) if axis == 0 else (m - k)
-    first, is_first = _offset(work, c, i, k, axis)
-    second, is_second = _offset(work, c, j, m, axis)
-    if is_first and is_second:
-        # both within a cell of the face
-        return 0.5 * (first - 0.5 * across + second + 0.5 * across)
-    if is_first:
-        return first - 0.5 * across
-    return second + 0.5 * across if is_second else 0.0
+def _place(ox0, oz0, ox1, oz1, half_x, half_z):  # type: ignore[no-untyped-def]
+    """Place of the interface from the face between two cells whose middles are ± half a step away, in cells."""
+    if ox0 < _UNKNOWN and ox1 < _UNKNOWN:
+        return 0.5 * (ox0 + ox1), 0.5 * (oz0 + oz1)
+    if ox0 < _UNKNOWN:
+        return ox0 - half_x, oz0 - half_z
+    if ox1 < _UNKNOWN:
+        return ox1 + half_x, oz1 + half_z
+    return 0.0, 0.0
 
 
 @njit(cache=True, error_model="numpy")
 def interface_forces(state, work, body, k_):  # type: ignore[no-untyped-def]
-    """Accelerations us, ws by the interface; the body force per mass at [x, z] is body[0:2] and its rates."""
-    c = state.c
+    """Accelerations us, ws by the interface, whose lines must have been found; body as `body_at` takes it."""
+    c, kappa, ox, oz = state.c, work.kappa, work.ox, work.oz
+    us, ws, bx, bz = work.us, work.ws, work.bx, work.bz
     nx, nz = c.shape
-    us, ws = work.us, work.ws
     us[:], ws[:] = 0.0, 0.0
-    jump = k_.rho_l - k_.rho_g
-    if k_.sigma > 0.0:
-        find_curvature(c, work, k_)
+    jump, sigma, dx, dz = k_.rho_l - k_.rho_g, k_.sigma, k_.dx, k_.dz
+    _find_places(c, work.mx, work.mz, work.alpha, ox, oz)
+    kappa[:] = _UNKNOWN
+    if sigma > 0.0:
+        find_curvature(c, work.mx, work.mz, work.smooth, kappa, dx, dz, k_.cot_advancing, k_.cot_receding)
     for i in range(1, nx):
         for k in range(nz):
             difference = c[i, k] - c[i - 1, k]
             if difference != 0.0:
-                kappa = _between(work.kappa[i - 1, k], work.kappa[i, k]) if k_.sigma > 0.0 else 0.0
-                along = _place(work, c, i - 1, k, i, k, 0) * k_.dx
-                up = _place(work, c, i - 1, k, i, k, 1) * k_.dz
-                ax, az = body_at(body, i * k_.dx, (k + 0.5) * k_.dz)
-                pressure = k_.sigma * kappa - jump * (ax * along + az * up)
-                us[i, k] = pressure * difference / k_.dx * work.bx[i, k]
+                along, up = _place(ox[i - 1, k], oz[i - 1, k], ox[i, k], oz[i, k], 0.5, 0.0)
+                ax, az = body_at(body, i * dx, (k + 0.5) * dz)
+                pressure = sigma * _between(kappa[i - 1, k], kappa[i, k]) - jump * (ax * along * dx + az * up * dz)
+                us[i, k] = pressure * difference / dx * bx[i, k]
     for i in range(nx):
         for k in range(1, nz):
             difference = c[i, k] - c[i, k - 1]
             if difference != 0.0:
-                kappa = _between(work.kappa[i, k - 1], work.kappa[i, k]) if k_.sigma > 0.0 else 0.0
-                along = _place(work, c, i, k - 1, i, k, 0) * k_.dx
-                up = _place(work, c, i, k - 1, i, k, 1) * k_.dz
-                ax, az = body_at(body, (i + 0.5) * k_.dx, k * k_.dz)
-                pressure = k_.sigma * kappa - jump * (ax * along + az * up)
-                ws[i, k] = pressure * difference / k_.dz * work.bz[i, k]
+                along, up = _place(ox[i, k - 1], oz[i, k - 1], ox[i, k], oz[i, k], 0.0, 0.5)
+                ax, az = body_at(body, (i + 0.5) * dx, k * dz)
+                pressure = sigma * _between(kappa[i, k - 1], kappa[i, k]) - jump * (ax * along * dx + az * up * dz)
+                ws[i, k] = pressure * difference / dz * bz[i, k]
 
 
 @njit(cache=True, error_model="numpy")
