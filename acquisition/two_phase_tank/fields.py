@@ -109,7 +109,9 @@ class Work(NamedTuple):
     u0, w0 : ndarray
         Velocities before.
     us, ws : ndarray
-        Changes of velocity by the interface (curvature and its place between the points of the grid).
+        Accelerations by the interface (curvature and its place between the points of the grid).
+    uc, wc : ndarray
+        Accelerations by curvature alone.
     uv, wv : ndarray
         Changes of velocity by viscosity and walls.
     bx, bz : ndarray
@@ -135,6 +137,8 @@ class Work(NamedTuple):
     w0: FloatArray
     us: FloatArray
     ws: FloatArray
+    uc: FloatArray
+    wc: FloatArray
     uv: FloatArray
     wv: FloatArray
     bx: FloatArray
@@ -173,5 +177,5 @@ def room(nx: int, nz: int) -> Work:
     nx, nz : int
     """
     cells, along, up = (nx, nz), (nx + 1, nz), (nx, nz + 1)
-    shapes = [*[cells] * 9, *[along] * 3, *[up] * 3, *[along, up] * 4]
+    shapes = [*[cells] * 9, *[along] * 3, *[up] * 3, *[along, up] * 5]
     return Work(*(np.zeros(shape) for shape in shapes))

@@ -111,6 +111,21 @@ def reconstruct(c, work):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
+def height_moment(mx, mz, alpha, fraction):  # type: ignore[no-untyped-def]
+    """∫ z over the liquid of a mixed cell, in units of the cell."""
+    ax, az = abs(mx), abs(mz)
+    a = alpha - min(mx, 0.0) - min(mz, 0.0)
+    if az < 1e-9:
+        return 0.5 * fraction
+    # full width below z1, none above z2
+    z1, z2 = min(max((a - ax) / az, 0.0), 1.0), min(max(a / az, 0.0), 1.0)
+    moment = 0.5 * z1 * z1
+    if ax > 1e-9:
+        moment += (0.5 * a * (z2 * z2 - z1 * z1) - az * (z2 * z2 * z2 - z1 * z1 * z1) / 3.0) / ax
+    return moment if mz > 0.0 else fraction - moment
+
+
+@njit(cache=True, error_model="numpy")
 def line_ends(mx, mz, alpha):  # type: ignore[no-untyped-def]
     """Both ends (x1, z1, x2, z2) of the line in the cell, in units of the cell."""
     flip_x, flip_z = mx < 0.0, mz < 0.0

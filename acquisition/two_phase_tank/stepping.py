@@ -30,7 +30,7 @@ from acquisition.two_phase_tank.energy import (
     VISCOSITY,
 )
 from acquisition.two_phase_tank.fields import Constants, Flow
-from acquisition.two_phase_tank.reconstruction import reconstruct
+from acquisition.two_phase_tank.reconstruction import EMPTY, height_moment, reconstruct
 from acquisition.two_phase_tank.surface import body_at, interface_forces, interface_length
 from acquisition.two_phase_tank.transport import transport
 from acquisition.two_phase_tank.viscosity import viscous_changes
@@ -86,11 +86,15 @@ def stored_energy(state, work, k_):  # type: ignore[no-untyped-def]
     for i in range(nx):
         for k in range(nz):
             work.rho[i, k] = k_.rho_g + jump * c[i, k]
-    potential = 0.0
+    moment = 0.0
     for i in range(nx):
         for k in range(nz):
-            potential += work.rho[i, k] * (k + 0.5) * k_.dz
-    return kinetic_energy(state, work) * cell, potential * cell * k_.gravity, k_.sigma * interface_length(state, work, k_)
+            f = c[i, k]
+            inside = height_moment(work.mx[i, k], work.mz[i, k], work.alpha[i, k], f) if EMPTY < f < 1.0 - EMPTY else 0.5 * f
+            moment += k * f + inside
+    # the gas fills what the liquid leaves
+    potential = jump * moment * k_.dz * cell * k_.gravity
+    return kinetic_energy(state, work) * cell, potential, k_.sigma * interface_length(state, work, k_)
 
 
 @njit(cache=True, error_model="numpy")
@@ -188,7 +192,7 @@ def _works(state, work, body, acceleration, dt, k_, sums):  # type: ignore[no-un
             along += push
             fx, _ = body_at(body, i * k_.dx, (k + 0.5) * k_.dz)
             roll += push * (fx + acceleration[0])
-            surface += push * work.us[i, k] * dt
+            surface += push * work.uc[i, k] * dt
             pressure += mean * (p[i, k] - p[i - 1, k]) / k_.dx * dt
     for i in range(nx):
         for k in range(1, nz):
@@ -197,7 +201,7 @@ def _works(state, work, body, acceleration, dt, k_, sums):  # type: ignore[no-un
             up += push
             _, fz = body_at(body, (i + 0.5) * k_.dx, k * k_.dz)
             roll += push * (fz + acceleration[1] + k_.gravity)
-            surface += push * work.ws[i, k] * dt
+            surface += push * work.wc[i, k] * dt
             pressure += mean * (p[i, k] - p[i, k - 1]) / k_.dz * dt
     cell = k_.dx * k_.dz
     sums[TANK_WORK] -= (acceleration[0] * along + acceleration[1] * up) * cell * dt

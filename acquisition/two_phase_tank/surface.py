@@ -199,11 +199,14 @@ def _place(ox0, oz0, ox1, oz1, half_x, half_z):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def interface_forces(state, work, body, k_):  # type: ignore[no-untyped-def]
-    """Accelerations us, ws by the interface, whose lines must have been found; body as `body_at` takes it."""
+    """Accelerations us, ws by the interface, of which uc, wc by its curvature alone.
+
+    Its lines must have been found; body as `body_at` takes it.
+    """
     c, kappa, ox, oz = state.c, work.kappa, work.ox, work.oz
-    us, ws, bx, bz = work.us, work.ws, work.bx, work.bz
+    us, ws, uc, wc, bx, bz = work.us, work.ws, work.uc, work.wc, work.bx, work.bz
     nx, nz = c.shape
-    us[:], ws[:] = 0.0, 0.0
+    us[:], ws[:], uc[:], wc[:] = 0.0, 0.0, 0.0, 0.0
     jump, sigma, dx, dz = k_.rho_l - k_.rho_g, k_.sigma, k_.dx, k_.dz
     _find_places(c, work.mx, work.mz, work.alpha, ox, oz)
     kappa[:] = _UNKNOWN
@@ -215,16 +218,16 @@ def interface_forces(state, work, body, k_):  # type: ignore[no-untyped-def]
             if difference != 0.0:
                 along, up = _place(ox[i - 1, k], oz[i - 1, k], ox[i, k], oz[i, k], 0.5, 0.0)
                 ax, az = body_at(body, i * dx, (k + 0.5) * dz)
-                pressure = sigma * _between(kappa[i - 1, k], kappa[i, k]) - jump * (ax * along * dx + az * up * dz)
-                us[i, k] = pressure * difference / dx * bx[i, k]
+                uc[i, k] = sigma * _between(kappa[i - 1, k], kappa[i, k]) * difference / dx * bx[i, k]
+                us[i, k] = uc[i, k] - jump * (ax * along * dx + az * up * dz) * difference / dx * bx[i, k]
     for i in range(nx):
         for k in range(1, nz):
             difference = c[i, k] - c[i, k - 1]
             if difference != 0.0:
                 along, up = _place(ox[i, k - 1], oz[i, k - 1], ox[i, k], oz[i, k], 0.0, 0.5)
                 ax, az = body_at(body, (i + 0.5) * dx, k * dz)
-                pressure = sigma * _between(kappa[i, k - 1], kappa[i, k]) - jump * (ax * along * dx + az * up * dz)
-                ws[i, k] = pressure * difference / dz * bz[i, k]
+                wc[i, k] = sigma * _between(kappa[i, k - 1], kappa[i, k]) * difference / dz * bz[i, k]
+                ws[i, k] = wc[i, k] - jump * (ax * along * dx + az * up * dz) * difference / dz * bz[i, k]
 
 
 @njit(cache=True, error_model="numpy")

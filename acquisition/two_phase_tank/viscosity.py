@@ -1,7 +1,8 @@
 """Viscous stresses of both fluids and the hold of the walls, with what they dissipate.
 
-Stresses 2μ D on the points where they belong, shear at corners of cells and stretching in their middles; the
-viscosity between two fluids is the harmonic mean, which keeps the shear stress across the interface.
+Stresses 2μ D on the points where they belong, shear at corners of cells and stretching in their middles. A cell that is
+partly full has that part of the liquid's viscosity; a corner has what the emptiest of the faces that meet there allows,
+so that the stress of the liquid never acts on gas alone.
 """
 
 from __future__ import annotations
@@ -10,18 +11,13 @@ from numba import njit
 
 
 @njit(cache=True, error_model="numpy")
-def _viscosity(f, k_):  # type: ignore[no-untyped-def]
-    """Harmonic mean of both viscosities for a volume fraction."""
-    return k_.mu_l * k_.mu_g / (f * k_.mu_g + (1.0 - f) * k_.mu_l)
-
-
-@njit(cache=True, error_model="numpy")
 def _shear(state, i, k, k_):  # type: ignore[no-untyped-def]
     """μ (∂u/∂z + ∂w/∂x) at the corner of faces [i, k], and the rate in brackets; at walls the velocity is zero there."""
     c, u, w = state.c, state.u, state.w
     nx, nz = c.shape
     i0, i1, k0, k1 = max(i - 1, 0), min(i, nx - 1), max(k - 1, 0), min(k, nz - 1)
-    f = 0.25 * (c[i0, k0] + c[i0, k1] + c[i1, k0] + c[i1, k1])
+    f = 0.5 * min(c[i0, k0] + c[i1, k0], c[i0, k1] + c[i1, k1], c[i0, k0] + c[i0, k1], c[i1, k0] + c[i1, k1])
+    mu = k_.mu_g + f * (k_.mu_l - k_.mu_g)
     hold = 1.0 - k_.slip
     if k == 0:
         du = 2.0 * hold * u[i, 0] / k_.dz
@@ -35,7 +31,7 @@ def _shear(state, i, k, k_):  # type: ignore[no-untyped-def]
         dw = -2.0 * hold * w[nx - 1, k] / k_.dx
     else:
         dw = (w[i, k] - w[i - 1, k]) / k_.dx
-    return _viscosity(f, k_) * (du + dw), du + dw
+    return mu * (du + dw), du + dw
 
 
 @njit(cache=True, error_model="numpy")
@@ -53,7 +49,7 @@ def viscous_changes(state, work, dt, k_):  # type: ignore[no-untyped-def]
     lost, dragged = 0.0, 0.0
     for i in range(nx):
         for k in range(nz):
-            mu = _viscosity(c[i, k], k_)
+            mu = k_.mu_g + c[i, k] * (k_.mu_l - k_.mu_g)
             ex, ez = (u[i + 1, k] - u[i, k]) / k_.dx, (w[i, k + 1] - w[i, k]) / k_.dz
             sx, sz = 2.0 * mu * ex, 2.0 * mu * ez
             lost += sx * ex + sz * ez
