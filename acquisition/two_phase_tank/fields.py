@@ -107,7 +107,9 @@ class Work(NamedTuple):
     ox, oz : ndarray, shape (nx, nz)
         Middle of the line of a mixed cell from the middle of the cell, in cells.
     u0, w0 : ndarray
-        Velocities before.
+        Velocities at the start.
+    ut, wt : ndarray
+        Velocities after they were carried.
     us, ws : ndarray
         Accelerations by the interface (curvature and its place between the points of the grid).
     uc, wc : ndarray
@@ -135,6 +137,8 @@ class Work(NamedTuple):
     fz: FloatArray
     u0: FloatArray
     w0: FloatArray
+    ut: FloatArray
+    wt: FloatArray
     us: FloatArray
     ws: FloatArray
     uc: FloatArray
@@ -177,5 +181,5 @@ def room(nx: int, nz: int) -> Work:
     nx, nz : int
     """
     cells, along, up = (nx, nz), (nx + 1, nz), (nx, nz + 1)
-    shapes = [*[cells] * 9, *[along] * 3, *[up] * 3, *[along, up] * 5]
+    shapes = [*[cells] * 9, *[along] * 3, *[up] * 3, *[along, up] * 6]
     return Work(*(np.zeros(shape) for shape in shapes))

@@ -135,23 +135,23 @@ def _find_volumes(work):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _accelerate(state, work, body, dt, k_):  # type: ignore[no-untyped-def]
-    """v⃗* from the carried velocities, which are kept in u0, w0."""
+    """v⃗* from the carried velocities, which are kept in ut, wt."""
     u, w = state.u, state.w
     nx, nz = state.c.shape
-    work.u0[:], work.w0[:] = u, w
+    work.ut[:], work.wt[:] = u, w
     spin = 2.0 * state.roll[1]
     for i in range(1, nx):
         for k in range(nz):
             fx, _ = body_at(body, i * k_.dx, (k + 0.5) * k_.dz)
             if spin != 0.0:
-                w0 = work.w0
+                w0 = work.wt
                 fx += spin * 0.25 * (w0[i - 1, k] + w0[i - 1, k + 1] + w0[i, k] + w0[i, k + 1])
             u[i, k] += dt * (fx + work.us[i, k]) + work.uv[i, k]
     for i in range(nx):
         for k in range(1, nz):
             _, fz = body_at(body, (i + 0.5) * k_.dx, k * k_.dz)
             if spin != 0.0:
-                u0 = work.u0
+                u0 = work.ut
                 fz -= spin * 0.25 * (u0[i, k - 1] + u0[i, k] + u0[i + 1, k - 1] + u0[i + 1, k])
             w[i, k] += dt * (fz + work.ws[i, k]) + work.wv[i, k]
 
@@ -181,33 +181,39 @@ def _push(state, work, dt, k_):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _works(state, work, body, acceleration, dt, k_, sums):  # type: ignore[no-untyped-def]
-    """Add what forces did on the mean of the carried and the new velocities."""
+    """Add what forces did.
+
+    Forces that have a potential work with the mean of the velocities before and after, which have no divergence. What
+    they do beyond that, on the divergence that carrying left, the pressure takes back; the rest of its work is a loss.
+    """
     u, w, p = state.u, state.w, state.p
     nx, nz = state.c.shape
     along = up = roll = surface = pressure = 0.0
     for i in range(1, nx):
         for k in range(nz):
+            carried = 0.5 * (work.ut[i, k] + u[i, k])
             mean = 0.5 * (work.u0[i, k] + u[i, k])
-            push = mean / work.bx[i, k]
-            along += push
             fx, _ = body_at(body, i * k_.dx, (k + 0.5) * k_.dz)
-            roll += push * (fx + acceleration[0])
-            surface += push * work.uc[i, k] * dt
-            pressure += mean * (p[i, k] - p[i - 1, k]) / k_.dx * dt
+            along += mean / work.bx[i, k]
+            roll += mean * (fx + acceleration[0]) / work.bx[i, k]
+            surface += mean * work.uc[i, k] / work.bx[i, k]
+            pressure += carried * (p[i, k] - p[i - 1, k]) / k_.dx
+            pressure -= (carried - mean) * (fx + work.us[i, k]) / work.bx[i, k]
     for i in range(nx):
         for k in range(1, nz):
+            carried = 0.5 * (work.wt[i, k] + w[i, k])
             mean = 0.5 * (work.w0[i, k] + w[i, k])
-            push = mean / work.bz[i, k]
-            up += push
             _, fz = body_at(body, (i + 0.5) * k_.dx, k * k_.dz)
-            roll += push * (fz + acceleration[1] + k_.gravity)
-            surface += push * work.wc[i, k] * dt
-            pressure += mean * (p[i, k] - p[i, k - 1]) / k_.dz * dt
-    cell = k_.dx * k_.dz
-    sums[TANK_WORK] -= (acceleration[0] * along + acceleration[1] * up) * cell * dt
-    sums[ROLL_WORK] += roll * cell * dt
-    sums[SURFACE] += surface * cell
-    sums[PRESSURE] += pressure * cell
+            up += mean / work.bz[i, k]
+            roll += mean * (fz + acceleration[1] + k_.gravity) / work.bz[i, k]
+            surface += mean * work.wc[i, k] / work.bz[i, k]
+            pressure += carried * (p[i, k] - p[i, k - 1]) / k_.dz
+            pressure -= (carried - mean) * (fz + work.ws[i, k]) / work.bz[i, k]
+    volume = k_.dx * k_.dz * dt
+    sums[TANK_WORK] -= (acceleration[0] * along + acceleration[1] * up) * volume
+    sums[ROLL_WORK] += roll * volume
+    sums[SURFACE] += surface * volume
+    sums[PRESSURE] += pressure * volume
 
 
 @njit(cache=True, error_model="numpy")

@@ -1,0 +1,215 @@
+"""W̄ and β of the half-filled tank on the shaker, computed with liquid and gas.
+
+Run as ``python -m studies.two_phase_verification.shaken --points map --output FILE``; what is in the file already is not
+computed again. W̄ and β are those of `studies.numerical_tank_verification.convergence`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from acquisition.numerical_tank.forced_motion import HarmonicMotion, moved
+from acquisition.numerical_tank.tank import STANDARD_GRAVITY_M_PER_S2, Box
+from acquisition.two_phase_tank.setup import Fluids, Walls, filled_two_phase_tank
+from acquisition.two_phase_tank.simulation import TwoPhaseTank
+from sloshlab.atomic_file import write_bytes
+
+TANK: Final = Box(0.1172, 0.0272, 0.078)
+RISE_CYCLES: Final = 3
+
+
+@dataclass(frozen=True)
+class Shaking:
+    """One motion of the tank, and how it is computed.
+
+    Attributes
+    ----------
+    acceleration_g, frequency_hz : float
+    n_cycles : int
+        The first half is left out.
+    cells_per_height : int
+    surface_tension_n_per_m : float
+    layer_frequency_hz : float
+        Of the boundary layers at the walls before and behind the plane; 0 is without.
+    hold : bool
+        Whether the walls in the plane hold the fluids.
+    seed : int
+    """
+
+    acceleration_g: float
+    frequency_hz: float
+    n_cycles: int = 40
+    cells_per_height: int = 24
+    surface_tension_n_per_m: float = Fluids().surface_tension_n_per_m
+    layer_frequency_hz: float = 0.0
+    hold: bool = True
+    seed: int = 0
+
+    @property
+    def name(self) -> str:
+        """One that no other has."""
+        return ", ".join(f"{key}={value:g}" for key, value in asdict(self).items())
+
+
+@dataclass(frozen=True)
+class Shaken:
+    """What one run gave over the last half of its cycles.
+
+    Attributes
+    ----------
+    w_bar, beta : float
+        Work of the tank on the fluids per cycle over m_l u₀² Ω², and −Re(Δf̌/ǔ̈)/m_l.
+    w_bar_scatter : float
+        Standard deviation of W̄ between cycles.
+    account_w_bar : float
+        The same work by the account of energy, in the frame of the tank.
+    shares : dict
+        Terms of the account over the work.
+    residual_share : float
+        What the account does not explain, over the work.
+    volume_change : float
+        Of the liquid since the start, over its volume.
+    computing_s_per_s : float
+        Seconds of one processor for a second of the tank.
+    """
+
+    w_bar: float
+    beta: float
+    w_bar_scatter: float
+    account_w_bar: float
+    shares: dict[str, float]
+    residual_share: float
+    volume_change: float
+    computing_s_per_s: float
+
+
+def shaken(case: Shaking) -> Shaken:
+    """Shake the tank with constant frequency and amplitude.
+
+    Parameters
+    ----------
+    case : Shaking
+    """
+    setup = filled_two_phase_tank(
+        TANK,
+        0.5,
+        case.cells_per_height,
+        fluids=Fluids(surface_tension_n_per_m=case.surface_tension_n_per_m),
+        walls=Walls(hold=case.hold, layer_frequency_hz=case.layer_frequency_hz),
+        seed=case.seed,
+    )
+    tank, period, omega = TwoPhaseTank(setup), 1 / case.frequency_hz, 2 * math.pi * case.frequency_hz
+    amplitude = case.acceleration_g * STANDARD_GRAVITY_M_PER_S2
+    motion = HarmonicMotion(amplitude, case.frequency_hz, rise_s=RISE_CYCLES * period)
+    volume, started_s = tank.liquid_volume_m2(), time.process_time()
+    n_used = case.n_cycles // 2
+    for _ in moved(tank, motion, (case.n_cycles - n_used) * period):
+        pass
+    before = tank.account()
+    unit = setup.liquid_mass_kg * (amplitude / omega) ** 2
+    works, in_phase = [], []
+    for _ in range(n_used):
+        blocks = list(moved(tank, motion, period, block_s=period))
+        times = np.concatenate([block.time_s for block in blocks])
+        force = np.concatenate([block.forces.vertical_n for block in blocks])
+        force += setup.fluid_mass_kg * STANDARD_GRAVITY_M_PER_S2
+        works.append(-float(np.mean(force * np.sin(omega * times))) * amplitude / omega * period / unit)
+        excess = force + setup.fluid_mass_kg * amplitude * np.cos(omega * times)
+        in_phase.append(-2 * float(np.mean(excess * np.cos(omega * times))) / (setup.liquid_mass_kg * amplitude))
+    spent = tank.account() - before
+    given = spent.tank_work_j_per_m
+    return Shaken(
+        float(np.mean(works)),
+        float(np.mean(in_phase)),
+        float(np.std(works)),
+        given * setup.box.depth_m / n_used / unit,
+        {name.removesuffix("_j_per_m"): value / given for name, value in asdict(spent).items()},
+        spent.residual_j_per_m / given,
+        tank.liquid_volume_m2() / volume - 1,
+        (time.process_time() - started_s) / tank.time_s,
+    )
+
+
+MAP: Final = (
+    Shaking(4.0, 11.4),
+    Shaking(1.0, 11.4, 80),
+    Shaking(0.5, 11.4, 120),
+    Shaking(2.0, 11.4),
+    Shaking(6.0, 18.0),
+    Shaking(4.0, 8.0, 30),
+    Shaking(4.0, 18.0),
+    Shaking(2.0, 18.0),
+)
+RESOLUTION: Final = tuple(Shaking(2.04, 10.7, cells_per_height=cells) for cells in (16, 24, 32, 48))
+CAUSES: Final = (
+    Shaking(0.5, 11.4, 120, layer_frequency_hz=5.7),
+    Shaking(1.0, 11.4, 80, layer_frequency_hz=5.7),
+    Shaking(1.0, 11.4, 80, surface_tension_n_per_m=0.0),
+    Shaking(0.5, 11.4, 120, surface_tension_n_per_m=0.0),
+    Shaking(4.0, 11.4, surface_tension_n_per_m=0.0),
+    Shaking(4.0, 11.4, hold=False),
+    Shaking(4.0, 11.4, cells_per_height=32),
+)
+POINTS: Final = {"map": MAP, "resolution": RESOLUTION, "causes": CAUSES}
+
+
+def rows(results: dict[str, dict[str, Any]], cases: Sequence[Shaking]) -> list[str]:
+    """Return a Markdown table of those cases that have been computed.
+
+    Parameters
+    ----------
+    results : dict
+        As in the file.
+    cases : sequence of Shaking
+    """
+    lines = ["| motion | cells | W̄ | β | advection | viscosity | pressure | residual | s per s |"]
+    lines.append("|---|---|---|---|---|---|---|---|---|")
+    for case in cases:
+        if (found := results.get(case.name)) is None:
+            continue
+        shares = found["shares"]
+        lines.append(
+            f"| {case.acceleration_g:g} g, {case.frequency_hz:g} Hz | {case.cells_per_height} |"
+            f" {found['w_bar']:.2f} ± {found['w_bar_scatter'] / math.sqrt(case.n_cycles // 2):.2f} |"
+            f" {found['beta']:.3f} | {100 * shares['advection']:.0f} % | {100 * shares['viscosity']:.0f} % |"
+            f" {100 * shares['pressure']:.0f} % | {100 * found['residual_share']:.1f} % |"
+            f" {found['computing_s_per_s']:.0f} |".replace("-", "−")
+        )
+    return lines
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Compute what is not there yet, and print the table.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        As on the command line.
+    """
+    parser = argparse.ArgumentParser(description="W̄ and β of the shaken tank of liquid and gas.")
+    parser.add_argument("--points", choices=sorted(POINTS), default="map")
+    parser.add_argument("--output", type=Path, required=True, help="JSON file that keeps the results")
+    chosen = parser.parse_args(arguments)
+    cases = POINTS[chosen.points]
+    results = json.loads(chosen.output.read_text()) if chosen.output.exists() else {}
+    for number, case in enumerate(cases):
+        if case.name not in results:
+            sys.stderr.write(f"{number + 1} of {len(cases)}: {case.name}\n")
+            results[case.name] = {"case": asdict(case), **asdict(shaken(case))}
+            write_bytes(chosen.output, (json.dumps(results, indent=1) + "\n").encode())
+    sys.stdout.write("\n".join(rows(results, cases)) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
