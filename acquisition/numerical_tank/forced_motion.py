@@ -8,11 +8,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from acquisition.numerical_tank.simulation import NumericalTank, WallForces
 from sloshlab.errors import InputError
 
 FloatArray = NDArray[np.float64]
@@ -56,8 +56,25 @@ class HarmonicMotion:
         return self.amplitude_m_per_s2 * share * np.cos(2 * math.pi * self.frequency_hz * since)
 
 
+ForcesT = TypeVar("ForcesT", covariant=True)
+
+
+class MovedTank(Protocol[ForcesT]):
+    """A computed tank, whatever its method: it takes the motion of its walls and tells the forces on them."""
+
+    @property
+    def setup(self) -> Any:
+        """What is computed; its `step_s` is the time step."""
+
+    def times_s(self, n_steps: int) -> FloatArray:
+        """Return the middles of the next steps."""
+
+    def advance(self, acceleration_m_per_s2: ArrayLike) -> ForcesT:
+        """Take one step for each acceleration."""
+
+
 @dataclass(frozen=True)
-class MovedBlock:
+class MovedBlock(Generic[ForcesT]):
     """What happened during a block of steps.
 
     Attributes
@@ -66,21 +83,23 @@ class MovedBlock:
         Middles of the steps.
     acceleration_m_per_s2 : ndarray, shape (n,) or (n, 2)
         Of the tank.
-    forces : WallForces
-        On the tank.
+    forces : WallForces or FluidForces
+        On the tank, as it tells them.
     """
 
     time_s: FloatArray
     acceleration_m_per_s2: FloatArray
-    forces: WallForces
+    forces: ForcesT
 
 
-def moved(tank: NumericalTank, motion: Motion, duration_s: float, *, block_s: float = 0.1) -> Iterator[MovedBlock]:
+def moved(
+    tank: MovedTank[ForcesT], motion: Motion, duration_s: float, *, block_s: float = 0.1
+) -> Iterator[MovedBlock[ForcesT]]:
     """Move a tank and yield what happened, block by block; between blocks it may be saved.
 
     Parameters
     ----------
-    tank : NumericalTank
+    tank : NumericalTank or TwoPhaseTank
         Goes on from where it is.
     motion : callable
         Accelerations at given times of the tank's clock.

@@ -77,7 +77,8 @@ class TwoPhaseAccount:
     @property
     def lost_j_per_m(self) -> float:
         """Sum of all losses."""
-        return sum(getattr(self, f.name) for f in fields(self)[4:])
+        sinks = self.viscosity_j_per_m + self.wall_drag_j_per_m + self.advection_j_per_m
+        return sinks + self.pressure_j_per_m + self.interface_j_per_m
 
     @property
     def residual_j_per_m(self) -> float:
@@ -105,6 +106,8 @@ def account(gained_j_per_m: Sequence[float], sums: NDArray[np.float64]) -> TwoPh
     sums : ndarray
         In the order of `TERMS`.
     """
-    given = float(sums[TANK_WORK] + sums[ROLL_WORK])
-    losses = (float(sums[term]) for term in (VISCOSITY, DRAG, CARRIED, PRESSURE))
-    return TwoPhaseAccount(*gained_j_per_m, given, *losses, -float(gained_j_per_m[2] + sums[SURFACE]))
+    kinetic, potential, surface = gained_j_per_m
+    viscosity, drag, carried, pressure = (float(sums[term]) for term in (VISCOSITY, DRAG, CARRIED, PRESSURE))
+    given, pushed = float(sums[TANK_WORK] + sums[ROLL_WORK]), float(sums[SURFACE])
+    interface = -(surface + pushed)
+    return TwoPhaseAccount(kinetic, potential, surface, given, viscosity, drag, carried, pressure, interface)

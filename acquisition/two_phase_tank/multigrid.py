@@ -99,7 +99,7 @@ def _invert(level):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def set_coefficients(levels, bx, bz, dx, dz):  # type: ignore[no-untyped-def]
-    """Give all grids the 1/ρ of the faces, bx of shape (nx + 1, nz) and bz of shape (nx, nz + 1); walls are closed."""
+    """Give all grids the 1/ρ of the faces, bx (nx + 1, nz) and bz (nx, nz + 1); walls are closed."""
     fine = levels[0]
     nx, nz = bz.shape[0], bx.shape[1]
     for i in range(1, nx):

@@ -1,7 +1,7 @@
 """The pressure of a part of a step, by one of two ways to the same equation.
 
-On small grids a band matrix is decomposed (Cholesky), which takes the same time whatever the liquid does. On larger
-ones, where that grows with the cube of the shorter side, conjugate gradients search.
+On small grids a band matrix is decomposed (Cholesky), which takes the same time whatever the liquid does. On
+larger ones, where that grows with the cube of the shorter side, conjugate gradients search.
 """
 
 from __future__ import annotations

@@ -44,8 +44,8 @@ class Walls:
     hold : bool
         Whether the fluids do not move along the walls in the plane (no slip).
     layer_frequency_hz : float
-        Frequency of the motion whose boundary layers at the walls before and behind the plane slow the liquid down,
-        2 ρ ν/(δ b) per volume with δ = √(ν/πf) and b the depth (Stokes' oscillating plate); 0 is without.
+        Frequency of the motion whose boundary layers at the walls before and behind the plane slow the liquid
+        down, 2 ρ ν/(δ b) per volume with δ = √(ν/πf) and b the depth (Stokes' oscillating plate); 0 is without.
     advancing_angle_deg, receding_angle_deg : float
         Contact angles between which the contact line is free; where both are equal it is the contact angle.
     """
@@ -145,7 +145,7 @@ class TwoPhaseSetup:
 
     @property
     def step_s(self) -> float:
-        """Time step: half of what capillary waves allow, a quarter of a cell at √(g H); parts of it are shorter."""
+        """Time step: half of what capillary waves allow, a quarter of a cell at √(g H); its parts are shorter."""
         side = min(self.cell_m)
         fluids = self.fluids
         longest = _LONGEST_STEP_S

@@ -1,6 +1,6 @@
 """The tank of liquid and gas: a state that steps when it is told how the tank moves.
 
-    forces = tank.advance(accelerations)      # means over every step
+forces = tank.advance(accelerations)      # means over every step
 """
 
 from __future__ import annotations
@@ -247,7 +247,9 @@ class TwoPhaseTank:
         InputError
             If one has another shape or type than this tank's, or is not finite.
         """
-        targets: dict[str, NDArray[Any]] = {f"state_{name}": value for name, value in self._state._asdict().items()}
+        targets: dict[str, NDArray[Any]] = {
+            f"state_{name}": value for name, value in self._state._asdict().items()
+        }
         targets |= {"sums": self._sums, "counters": self._counters, "start": np.zeros(3)}
         for name, target in targets.items():
             given = arrays[name]

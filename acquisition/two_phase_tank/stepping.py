@@ -1,12 +1,12 @@
 """One step of the tank, in as many parts as the fastest fluid asks for.
 
-Each part carries liquid and momenta with the velocities at its start, gives them the forces of the new arrangement, and
-takes the divergence out again by the pressure:
+Each part carries liquid and momenta with the velocities at its start, gives them the forces of the new
+arrangement, and takes the divergence out again by the pressure:
 
     (C, ρ v⃗)ⁿ → carried → v⃗* = ṽ + Δt (f⃗ + surface + viscosity) → v⃗ⁿ⁺¹ = v⃗* − Δt ∇p/ρ,  ∇·v⃗ⁿ⁺¹ = 0
 
-Place before velocity, velocity before place: a wave that nothing damps keeps its energy (symplectic Euler). Forces work
-with the mean of the velocities before and after (ṽ + v⃗ⁿ⁺¹)/2, which makes the account exact.
+First the place by the velocity, then the velocity by the place: a wave that nothing damps keeps its energy
+(symplectic Euler). What forces do is counted with the mean of the velocities before and after.
 """
 
 from __future__ import annotations
@@ -90,7 +90,11 @@ def stored_energy(state, work, k_):  # type: ignore[no-untyped-def]
     for i in range(nx):
         for k in range(nz):
             f = c[i, k]
-            inside = height_moment(work.mx[i, k], work.mz[i, k], work.alpha[i, k], f) if EMPTY < f < 1.0 - EMPTY else 0.5 * f
+            inside = (
+                height_moment(work.mx[i, k], work.mz[i, k], work.alpha[i, k], f)
+                if EMPTY < f < 1.0 - EMPTY
+                else 0.5 * f
+            )
             moment += k * f + inside
     # the gas fills what the liquid leaves
     potential = jump * moment * k_.dz * cell * k_.gravity
@@ -183,8 +187,9 @@ def _push(state, work, dt, k_):  # type: ignore[no-untyped-def]
 def _works(state, work, body, acceleration, dt, k_, sums):  # type: ignore[no-untyped-def]
     """Add what forces did.
 
-    Forces that have a potential work with the mean of the velocities before and after, which have no divergence. What
-    they do beyond that, on the divergence that carrying left, the pressure takes back; the rest of its work is a loss.
+    Forces that have a potential work with the mean of the velocities before and after, which have no divergence.
+    What they do beyond that, on the divergence that carrying left, the pressure takes back; the rest of its work
+    is a loss.
     """
     u, w, p = state.u, state.w, state.p
     nx, nz = state.c.shape

@@ -1,10 +1,10 @@
 """Liquid, mass and momentum carried by one and the same volumes.
 
-The split advection of Weymouth & Yue (2010), J. Comput. Phys. 229, 2853: one direction after the other, each with the
-dilatation of its own direction weighted by the phase that a cell had at the start, which conserves the liquid to the
-divergence of the velocity. The mass of a momentum's volume is the mean of the two cells it lies in, and so are the
-masses that cross its sides: momentum then moves with exactly the mass that moves (Rudman 1998; Bussmann, Kothe &
-Sicilian 2002), without which a gas of a thousandth of the density is torn along.
+The split advection of Weymouth & Yue (2010), J. Comput. Phys. 229, 2853: one direction after the other, each with
+the dilatation of its own direction weighted by the phase that a cell had at the start, which conserves the liquid
+to the divergence of the velocity. The mass of a momentum's volume is the mean of the two cells it lies in, and so
+are the masses that cross its sides: momentum then moves with exactly the mass that moves (Rudman 1998; Bussmann,
+Kothe & Sicilian 2002), without which a gas of a thousandth of the density is torn along.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def _limited(behind, ahead):  # type: ignore[no-untyped-def]
 @njit(cache=True, error_model="numpy")
 def _volumes_x(state, work, dt, k_):  # type: ignore[no-untyped-def]
     """Volume, liquid and mass through the faces in x."""
-    c, u = state.c, state.u
+    c = state.c
     nx, nz = c.shape
     vx, lx, fx = work.vx, work.lx, work.fx
     jump = k_.rho_l - k_.rho_g
@@ -38,9 +38,7 @@ def _volumes_x(state, work, dt, k_):  # type: ignore[no-untyped-def]
             v = work.u0[i, k] * dt / k_.dx
             donor = i - 1 if v > 0.0 else i
             f = c[donor, k]
-            if f <= EMPTY:
-                share = f * v
-            elif f >= 1.0 - EMPTY:
+            if f <= EMPTY or f >= 1.0 - EMPTY:
                 share = f * v
             elif v > 0.0:
                 share = share_right(work.mx[donor, k], work.mz[donor, k], work.alpha[donor, k], v)
@@ -61,9 +59,7 @@ def _volumes_z(state, work, dt, k_):  # type: ignore[no-untyped-def]
             v = work.w0[i, k] * dt / k_.dz
             donor = k - 1 if v > 0.0 else k
             f = c[i, donor]
-            if f <= EMPTY:
-                share = f * v
-            elif f >= 1.0 - EMPTY:
+            if f <= EMPTY or f >= 1.0 - EMPTY:
                 share = f * v
             elif v > 0.0:
                 share = share_right(work.mz[i, donor], work.mx[i, donor], work.alpha[i, donor], v)

@@ -1,8 +1,8 @@
 """Viscous stresses of both fluids and the hold of the walls, with what they dissipate.
 
-Stresses 2μ D on the points where they belong, shear at corners of cells and stretching in their middles. A cell that is
-partly full has that part of the liquid's viscosity; a corner has what the emptiest of the faces that meet there allows,
-so that the stress of the liquid never acts on gas alone.
+Stresses 2μ D on the points where they belong, shear at corners of cells and stretching in their middles. A cell
+that is partly full has that part of the liquid's viscosity; a corner has what the emptiest of the faces that meet
+there allows, so that the stress of the liquid never acts on gas alone.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from numba import njit
 
 @njit(cache=True, error_model="numpy")
 def _shear(state, i, k, k_):  # type: ignore[no-untyped-def]
-    """μ (∂u/∂z + ∂w/∂x) at the corner of faces [i, k], and the rate in brackets; at walls the velocity is zero there."""
+    """μ (∂u/∂z + ∂w/∂x) at the corner of faces [i, k], and the rate in brackets; walls that hold are at rest."""
     c, u, w = state.c, state.u, state.w
     nx, nz = c.shape
     i0, i1, k0, k1 = max(i - 1, 0), min(i, nx - 1), max(k - 1, 0), min(k, nz - 1)

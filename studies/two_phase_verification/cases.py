@@ -131,15 +131,17 @@ def history(tank: TwoPhaseTank, k: float, duration_s: float, acceleration: Float
     return np.array(rows).T
 
 
-def damped_cosine(times_s: FloatArray, values: FloatArray, omega: float, decay: float) -> tuple[float, float]:
+def damped_cosine(course: FloatArray, omega: float, decay: float) -> tuple[float, float]:
     """Fit a e^{−γt} cos(ωt + φ); return ω [rad/s] and γ [1/s].
 
     Parameters
     ----------
-    times_s, values : ndarray
+    course : ndarray, shape (2, n)
+        Times [s] and values.
     omega, decay : float
         Where the fit begins.
     """
+    times_s, values = course
 
     def misfit(p: FloatArray) -> FloatArray:
         return np.asarray(p[0] * np.exp(-p[1] * times_s) * np.cos(p[2] * times_s + p[3]) - values)
@@ -150,7 +152,7 @@ def damped_cosine(times_s: FloatArray, values: FloatArray, omega: float, decay: 
 
 
 def standing_wave(cells_per_height: int, mode: int = 1, n_periods: float = 6.0) -> list[Finding]:
-    """Compare a small standing wave of a thick liquid with the theory of two layers and the decay 2νk² (walls slip).
+    """Compare a small standing wave of a thick liquid with theory: two layers, decay 2νk², walls that slip.
 
     Parameters
     ----------
@@ -161,7 +163,7 @@ def standing_wave(cells_per_height: int, mode: int = 1, n_periods: float = 6.0) 
     """
     tank, k = wave_tank(cells_per_height, mode, THICK, 0.02)
     omega, viscous = wave_frequency(THICK, k, 0.05, 0.05), 2 * THICK.viscosity_m2_per_s * k**2
-    measured, decay = damped_cosine(*history(tank, k, n_periods * 2 * math.pi / omega), omega, viscous)
+    measured, decay = damped_cosine(history(tank, k, n_periods * 2 * math.pi / omega), omega, viscous)
     # a damped wave is slower by this: ω² = ω₀² − γ²
     expected = math.sqrt(omega**2 - viscous**2)
     name = f"standing wave, mode {mode}, {cells_per_height} cells"
@@ -205,7 +207,7 @@ def drop(cells_per_height: int, n_periods: float = 2.0) -> list[Finding]:
     while tank.time_s < n_periods * 2 * math.pi / omega:
         tank.advance(np.zeros(2))
         rows.append((tank.time_s, float((tank.liquid_fraction * weights).sum())))
-    measured, _ = damped_cosine(*np.array(rows).T, omega, 0.02 * omega)
+    measured, _ = damped_cosine(np.array(rows).T, omega, 0.02 * omega)
     name = f"drop, {cells_per_height / 4:g} cells per radius"
     return [Finding(name, "ω / √(6σ/((ρ₁ + ρ₂)R³))", measured / omega, 1.0, 0.02)]
 
@@ -265,7 +267,7 @@ def growth_rate(stiffness: float, decay: float, share: float, omega: float) -> f
 
 
 def faraday_threshold(cells_per_height: int, mode: int = 2) -> list[Finding]:
-    """Shake a thick liquid vertically at twice the frequency of a wave; where does the wave neither grow nor decay?
+    """Shake a thick liquid at twice the frequency of a wave: where does the wave neither grow nor decay?
 
     In a box whose walls slip the linear theory of Kumar & Tuckerman (1994) is, for a layer of viscosity that is
     small beside the wave, the damped Mathieu equation with γ = 2νk².
@@ -299,4 +301,8 @@ def faraday_threshold(cells_per_height: int, mode: int = 2) -> list[Finding]:
         measured.append(float(np.polyfit(middles, np.log(peaks), 1)[0]))
     slope = (measured[1] - measured[0]) / (levels[1] - levels[0])
     name = f"Faraday waves, mode {mode}, {cells_per_height} cells"
-    return [Finding(name, "threshold of the acceleration / theory", (levels[0] - measured[0] / slope) / expected, 1.0, 0.1)]
+    return [
+        Finding(
+            name, "threshold of the acceleration / theory", (levels[0] - measured[0] / slope) / expected, 1.0, 0.1
+        )
+    ]

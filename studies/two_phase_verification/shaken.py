@@ -1,7 +1,7 @@
 """W̄ and β of the half-filled tank on the shaker, computed with liquid and gas.
 
-Run as ``python -m studies.two_phase_verification.shaken --points map --output FILE``; what is in the file already is not
-computed again. W̄ and β are those of `studies.numerical_tank_verification.convergence`.
+Run as ``python -m studies.two_phase_verification.shaken --points map --output FILE``; what is in the file already
+is not computed again. W̄ and β are those of `studies.numerical_tank_verification.convergence`.
 """
 
 from __future__ import annotations
