@@ -17,6 +17,7 @@ TERMS: Final = (
     "carried",
     "pressure",
     "surface",
+    "place",
     "clipped",
     "iterations",
     "parts",
@@ -30,6 +31,7 @@ TERMS: Final = (
     CARRIED,
     PRESSURE,
     SURFACE,
+    PLACE,
     CLIPPED,
     ITERATIONS,
     PARTS,
@@ -57,6 +59,9 @@ class TwoPhaseAccount:
     interface_j_per_m : float
         Taken when lines are drawn anew: what the interface lost in length without having pushed the fluids. It is
         negative where liquid breaks up, for the lines in the cells lengthen without work.
+    place_j_per_m : float
+        Taken by the force that stands for the place of the interface between the points of the grid; negative where
+        it gives some.
     """
 
     kinetic_j_per_m: float
@@ -68,6 +73,7 @@ class TwoPhaseAccount:
     advection_j_per_m: float
     pressure_j_per_m: float
     interface_j_per_m: float
+    place_j_per_m: float
 
     @property
     def gained_j_per_m(self) -> float:
@@ -78,7 +84,7 @@ class TwoPhaseAccount:
     def lost_j_per_m(self) -> float:
         """Sum of all losses."""
         sinks = self.viscosity_j_per_m + self.wall_drag_j_per_m + self.advection_j_per_m
-        return sinks + self.pressure_j_per_m + self.interface_j_per_m
+        return sinks + self.pressure_j_per_m + self.interface_j_per_m + self.place_j_per_m
 
     @property
     def residual_j_per_m(self) -> float:
@@ -109,5 +115,7 @@ def account(gained_j_per_m: Sequence[float], sums: NDArray[np.float64]) -> TwoPh
     kinetic, potential, surface = gained_j_per_m
     viscosity, drag, carried, pressure = (float(sums[term]) for term in (VISCOSITY, DRAG, CARRIED, PRESSURE))
     given, pushed = float(sums[TANK_WORK] + sums[ROLL_WORK]), float(sums[SURFACE])
-    interface = -(surface + pushed)
-    return TwoPhaseAccount(kinetic, potential, surface, given, viscosity, drag, carried, pressure, interface)
+    interface, place = -(surface + pushed), -float(sums[PLACE])
+    return TwoPhaseAccount(
+        kinetic, potential, surface, given, viscosity, drag, carried, pressure, interface, place
+    )
