@@ -141,24 +141,24 @@ def shaken(case: Shaking) -> Shaken:
 
 
 MAP: Final = (
-    Shaking(4.0, 11.4),
-    Shaking(1.0, 11.4, 80),
-    Shaking(0.5, 11.4, 120),
-    Shaking(2.0, 11.4),
-    Shaking(6.0, 18.0),
-    Shaking(4.0, 8.0, 30),
-    Shaking(4.0, 18.0),
-    Shaking(2.0, 18.0),
+    Shaking(4.0, 11.4, 30),
+    Shaking(0.5, 11.4, 100),
+    Shaking(1.0, 11.4, 60),
+    Shaking(2.0, 11.4, 36),
+    Shaking(6.0, 18.0, 36),
+    Shaking(4.0, 8.0, 24),
+    Shaking(4.0, 18.0, 36),
+    Shaking(2.0, 18.0, 36),
 )
-RESOLUTION: Final = tuple(Shaking(2.04, 10.7, cells_per_height=cells) for cells in (16, 24, 32, 48))
+RESOLUTION: Final = tuple(Shaking(2.04, 10.7, 30, cells_per_height=cells) for cells in (16, 24, 32, 48))
 CAUSES: Final = (
-    Shaking(0.5, 11.4, 120, layer_frequency_hz=5.7),
-    Shaking(1.0, 11.4, 80, layer_frequency_hz=5.7),
-    Shaking(1.0, 11.4, 80, surface_tension_n_per_m=0.0),
-    Shaking(0.5, 11.4, 120, surface_tension_n_per_m=0.0),
-    Shaking(4.0, 11.4, surface_tension_n_per_m=0.0),
-    Shaking(4.0, 11.4, hold=False),
-    Shaking(4.0, 11.4, cells_per_height=32),
+    Shaking(0.5, 11.4, 100, layer_frequency_hz=5.7),
+    Shaking(1.0, 11.4, 60, layer_frequency_hz=5.7),
+    Shaking(1.0, 11.4, 60, surface_tension_n_per_m=0.0),
+    Shaking(0.5, 11.4, 100, surface_tension_n_per_m=0.0),
+    Shaking(4.0, 11.4, 30, surface_tension_n_per_m=0.0),
+    Shaking(4.0, 11.4, 30, hold=False),
+    Shaking(4.0, 11.4, 30, cells_per_height=32),
 )
 POINTS: Final = {"map": MAP, "resolution": RESOLUTION, "causes": CAUSES}
 
