@@ -11,7 +11,7 @@ import json
 import math
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -20,12 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.numerical_tank import checkpoint as checkpoints
-from acquisition.numerical_tank.forced_motion import averaged
+from acquisition.numerical_tank.forced_motion import MovedTank, averaged
 from acquisition.numerical_tank.instability import InstabilityError
 from acquisition.numerical_tank.long_computation import LongComputation
 from acquisition.numerical_tank.sampling import HALF_LENGTH_SAMPLES, oversampling, sampled
 from acquisition.numerical_tank.simulation import NumericalTank
-from acquisition.numerical_tank.tank import TankSetup
 from sloshlab.errors import InputError, RecordingInterruptedError
 
 FloatArray = NDArray[np.float64]
@@ -37,6 +36,34 @@ Progress = Callable[[float], None]
 # of computing: what a kill or a power cut costs
 SAVED_EVERY_S: Final = 20.0
 _BLOCK_S: Final = 0.1
+
+
+@dataclass(frozen=True)
+class TankMethod:
+    """How a liquid is computed: a tank, its checkpoints, and what its force at rest weighs.
+
+    Attributes
+    ----------
+    make : callable
+        Takes a setup, returns the tank.
+    save : callable
+        Takes tank, path and further arrays.
+    load : callable
+        Takes a path, returns the tank and the further arrays.
+    mass_kg : callable
+        Takes a setup, returns the mass of all fluid.
+    """
+
+    make: Callable[[Any], MovedTank[Any]]
+    save: Callable[[Any, Path, Mapping[str, NDArray[Any]]], None]
+    load: Callable[[Path], tuple[Any, dict[str, NDArray[Any]]]]
+    mass_kg: Callable[[Any], float]
+
+
+PARTICLES: Final = TankMethod(
+    NumericalTank, checkpoints.save, checkpoints.load_with_extra, lambda setup: float(setup.liquid_mass_kg)
+)
+"""Smoothed particles: the liquid alone."""
 
 
 class ComputationInterruptedError(RecordingInterruptedError):
@@ -64,10 +91,11 @@ class ComputedForce:
 
 
 def computed_force(
-    setup: TankSetup,
+    setup: Any,
     acceleration_m_per_s2: VerticalMotion,
     duration_s: float,
     *,
+    method: TankMethod = PARTICLES,
     checkpoint: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
     saved_every_s: float = SAVED_EVERY_S,
@@ -77,13 +105,15 @@ def computed_force(
 
     Parameters
     ----------
-    setup : TankSetup
+    setup : TankSetup or TwoPhaseSetup
         With a sampling rate.
     acceleration_m_per_s2 : callable
         Vertical acceleration of the tank [m/s²] at times [s]; also asked for up to 12 samples beyond the end,
         which the filter of the last samples needs. Before the start the tank is at rest.
     duration_s : float
         Duration of the run.
+    method : TankMethod
+        Of the setup.
     checkpoint : path-like, optional
         Where the state is saved from time to time. If the file is there, the computation goes on from it.
     progress : callable, optional
@@ -106,7 +136,7 @@ def computed_force(
         At Ctrl-C or SIGTERM, if there is a checkpoint.
     """
     n_samples = _n_samples(setup, duration_s)
-    run = _Computation(setup, acceleration_m_per_s2, n_samples)
+    run = _Computation(setup, acceleration_m_per_s2, n_samples, method)
     path = None if checkpoint is None else Path(checkpoint)
     if path is not None and path.exists():
         run.restore(path)
@@ -125,7 +155,7 @@ def computed_force(
 class _Computation(LongComputation):
     """A tank, its motion and the mean forces so far."""
 
-    def __init__(self, setup: TankSetup, motion: VerticalMotion, n_samples: int) -> None:
+    def __init__(self, setup: Any, motion: VerticalMotion, n_samples: int, method: TankMethod) -> None:
         self._n_means = oversampling(setup.steps_per_sample)
         self._steps_per_mean = setup.steps_per_sample // self._n_means
         # the filter of the last sample needs half its length beyond it
@@ -134,9 +164,10 @@ class _Computation(LongComputation):
         self._at_once = max(round(_BLOCK_S / (self._steps_per_mean * setup.step_s)), 1)
         self._n_done = 0
         self._motion = motion
-        self._weight_n = setup.gravity_m_per_s2 * setup.liquid_mass_kg
+        self._weight_n = setup.gravity_m_per_s2 * method.mass_kg(setup)
         self._run = _identity(setup, motion, n_samples)
-        self.tank = NumericalTank(setup)
+        self._method = method
+        self.tank: Any = method.make(setup)
         self.computing_s = 0.0
 
     @property
@@ -150,7 +181,7 @@ class _Computation(LongComputation):
     @property
     def is_consistent(self) -> bool:
         """False if an interrupt fell between a block of steps and the storing of its forces."""
-        return self.tank.n_steps == self._n_done * self._steps_per_mean
+        return bool(self.tank.n_steps == self._n_done * self._steps_per_mean)
 
     def advance(self) -> str:
         """Compute a block; return why it became unstable, or nothing."""
@@ -177,10 +208,10 @@ class _Computation(LongComputation):
             "means": self._means[: self._n_done],
             "computing_s": np.array([self.computing_s]),
         }
-        checkpoints.save(self.tank, path, extra)
+        self._method.save(self.tank, path, extra)
 
     def restore(self, path: Path) -> None:
-        tank, extra = checkpoints.load_with_extra(path)
+        tank, extra = self._method.load(path)
         if extra.get("run", np.zeros(0)).tobytes() != self._run.tobytes():
             remedy = "remove it, or give another name"
             raise InputError(f"{path}", got="the checkpoint of another run", remedy=remedy)
@@ -192,7 +223,7 @@ class _Computation(LongComputation):
         self._means[: means.size] = means
 
 
-def _n_samples(setup: TankSetup, duration_s: float) -> int:
+def _n_samples(setup: Any, duration_s: float) -> int:
     if setup.sampling_rate_hz is None:
         raise InputError("sampling_rate_hz of the tank", got="none", allowed="1 … 1e6")
     if not (math.isfinite(duration_s) and duration_s * setup.sampling_rate_hz >= 1):
@@ -200,7 +231,7 @@ def _n_samples(setup: TankSetup, duration_s: float) -> int:
     return round(duration_s * setup.sampling_rate_hz)
 
 
-def _identity(setup: TankSetup, motion: VerticalMotion, n_samples: int) -> NDArray[np.uint8]:
+def _identity(setup: Any, motion: VerticalMotion, n_samples: int) -> NDArray[np.uint8]:
     """Hash of all that determines the run: setup, and motion at the times of the samples."""
     digest = hashlib.sha256(json.dumps(asdict(setup), sort_keys=True).encode())
     # a function has no bytes of its own; its values at the samples stand for it

@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.numerical_tank.computed_force import ComputedForce, computed_force
+from acquisition.numerical_tank.computed_force import PARTICLES, ComputedForce, TankMethod, computed_force
 from acquisition.numerical_tank.instability import STOPPED
 from acquisition.numerical_tank.tank import Box, Liquid, TankSetup, filled_tank
+from acquisition.two_phase_tank.method import LIQUID_AND_GAS
+from acquisition.two_phase_tank.setup import Fluids, TwoPhaseSetup, filled_two_phase_tank
 from acquisition.virtual_laboratory.tone_motion import TankMotion
 from sloshlab._version import __version__
 from sloshlab.errors import InputError
@@ -59,6 +61,56 @@ def numerical_setup(rig: Rig, *, layers_per_height: int, seed: int, sampling_rat
     )
 
 
+def two_phase_setup(rig: Rig, *, cells_per_height: int, seed: int, sampling_rate_hz: float) -> TwoPhaseSetup:
+    """The tank of liquid and gas of a rig.
+
+    Parameters
+    ----------
+    rig : Rig
+        Inside of the tank, density, fill level and, where it tells them, viscosity and surface tension; what it does
+        not tell is that of water. The gas is air.
+    cells_per_height : int
+    seed : int
+        Of the disturbance at the start.
+    sampling_rate_hz : float
+        A whole number of steps makes a sample.
+
+    Raises
+    ------
+    InputError
+        If such a tank cannot be computed.
+    """
+    water, liquid = Fluids(), rig.liquid
+    viscosity, tension = liquid.kinematic_viscosity_m2_per_s, liquid.surface_tension_n_per_m
+    fluids = Fluids(
+        liquid.density_kg_per_m3,
+        water.viscosity_m2_per_s if viscosity is None else viscosity,
+        surface_tension_n_per_m=water.surface_tension_n_per_m if tension is None else tension,
+    )
+    return filled_two_phase_tank(
+        Box(rig.tank.length_m, rig.tank.height_m, rig.tank.width_m),
+        liquid.fill_level,
+        cells_per_height,
+        fluids=fluids,
+        seed=seed,
+        sampling_rate_hz=sampling_rate_hz,
+    )
+
+
+def two_phase_attributes(setup: TwoPhaseSetup) -> dict[str, Any]:
+    """Global attributes of a recording whose liquid was computed with its gas."""
+    return {
+        "liquid": "two_phase_tank",
+        "cells_per_height": setup.cells_per_height,
+        "step_s": setup.step_s,
+        "viscosity_m2_per_s": setup.fluids.viscosity_m2_per_s,
+        "surface_tension_n_per_m": setup.fluids.surface_tension_n_per_m,
+        "gas_density_kg_per_m3": setup.fluids.gas_density_kg_per_m3,
+        "seed": setup.seed,
+        "sloshlab_version": __version__,
+    }
+
+
 def method_attributes(setup: TankSetup) -> dict[str, Any]:
     """Global attributes of a recording that tell how its liquid was computed."""
     return {
@@ -80,19 +132,23 @@ class NumericalLiquid:
     Attributes
     ----------
     layers_per_height : int
-        Height of the tank over the distance of the particles.
+        Height of the tank over the distance of the particles, or over the side of a cell.
     checkpoint : path-like, optional
         Where the state is saved from time to time, and taken up if it is there.
     progress : callable, optional
         Called with the share of the work done.
     finished : callable, optional
         Called with what was computed, the time that it took included.
+    with_gas : bool
+        Whether liquid and gas are computed on a grid; else the liquid alone as particles. A structure carries
+        particles only.
     """
 
     layers_per_height: int = 16
     checkpoint: str | os.PathLike[str] | None = None
     progress: Callable[[float], None] | None = None
     finished: Callable[[ComputedForce], None] | None = None
+    with_gas: bool = False
 
     def force_n(
         self, rig: Rig, motion: TankMotion, configuration: str, *, sampling_rate_hz: float, seed: int
@@ -124,13 +180,12 @@ class NumericalLiquid:
             force_n = -mass_kg * motion.at(time_s).acceleration
             return force_n, {"liquid": configuration, "seed": seed, "sloshlab_version": __version__}
         # the same seed as for the shaker's imperfections: repeats differ in both
-        setup = numerical_setup(
-            rig, layers_per_height=self.layers_per_height, seed=seed, sampling_rate_hz=sampling_rate_hz
-        )
+        setup, method, told = self._described(rig, seed, sampling_rate_hz)
         computed = computed_force(
             setup,
             lambda time_s: motion.at(time_s).acceleration,
             motion.duration_s,
+            method=method,
             checkpoint=self.checkpoint,
             progress=self.progress,
         )
@@ -139,4 +194,14 @@ class NumericalLiquid:
         if not computed.vertical_n.size:
             raise InputError("numerical tank: not one sample", got=computed.stopped)
         stopped = {STOPPED: computed.stopped} if computed.stopped else {}
-        return computed.vertical_n, {**method_attributes(setup), **stopped}
+        return computed.vertical_n, {**told, **stopped}
+
+    def _described(self, rig: Rig, seed: int, rate_hz: float) -> tuple[Any, TankMethod, dict[str, Any]]:
+        """What is computed, how, and what the recording says of it."""
+        if self.with_gas:
+            both = two_phase_setup(
+                rig, cells_per_height=self.layers_per_height, seed=seed, sampling_rate_hz=rate_hz
+            )
+            return both, LIQUID_AND_GAS, two_phase_attributes(both)
+        setup = numerical_setup(rig, layers_per_height=self.layers_per_height, seed=seed, sampling_rate_hz=rate_hz)
+        return setup, PARTICLES, method_attributes(setup)

@@ -26,7 +26,7 @@ BENCHMARKS: Final = ("silverbox", "emps", "f16", "bouc_wen", "cascaded_tanks", "
 NETWORKS: Final = ("normalised_rbf", "rbf", "multilayer")
 SWEEP_LAWS: Final = ("octave", "linear", "stepped")
 LABORATORIES: Final = ("exact", "drawn")
-LIQUIDS: Final = ("law", "numerical")
+LIQUIDS: Final = ("law", "numerical", "two_phase")
 ALIGNMENTS: Final = ("host", "device", "counter")
 _SERIAL_PORTS: Final = ("/dev/ttyUSB*", "/dev/ttyACM*", "/dev/cu.usb*")
 

@@ -102,9 +102,11 @@ def virtual(
     ] = None,
     liquid: Annotated[
         str,
-        typer.Option(help="law, or numerical: computed, takes long.", autocompletion=one_of(LIQUIDS)),
+        typer.Option(
+            help="law, or computed, which takes long: numerical, or two_phase.", autocompletion=one_of(LIQUIDS)
+        ),
     ] = "law",
-    layers: Annotated[int, typer.Option(help="Layers of particles over the height of the tank.")] = 16,
+    layers: Annotated[int, typer.Option(help="Layers of particles, or cells, over the height of the tank.")] = 16,
     checkpoint: Annotated[
         Path | None,
         typer.Option(

@@ -38,7 +38,7 @@ if TYPE_CHECKING:  # the compiled loops of a computed liquid take a second to lo
 DEVIATIONS: Final = "laboratory_deviations"
 """Attribute of a recording: in what the laboratory differs from what the rig tells, as JSON."""
 LABORATORIES: Final = ("exact", "drawn")
-LIQUIDS: Final = ("law", "numerical")
+LIQUIDS: Final = ("law", "numerical", "two_phase")
 CAMPAIGN: Final = "campaign"
 """In place of an experiment: a whole folder of raw_data."""
 
@@ -195,17 +195,25 @@ def _check_run(run: VirtualRun) -> None:
         allowed = (*virtual_experiments(), CAMPAIGN)
         raise InputError("EXPERIMENT", got=repr(run.experiment), allowed=", ".join(allowed))
     _check_liquid(run.liquid)
+    if run.liquid == "two_phase" and EXPERIMENTS[run.experiment].structure:
+        remedy = "a structure carries particles: take numerical"
+        raise InputError("--liquid", got=f"two_phase for {run.experiment}", remedy=remedy)
 
 
 def _computed(run: VirtualRun, rig: RigSource, saved: Path) -> xr.Dataset:
     """The run, with progress; a computed liquid is saved meanwhile."""
     # no law is known for the liquid in a tank that moves with a structure
-    if run.liquid != "numerical" and not EXPERIMENTS[run.experiment].structure:
+    if run.liquid == "law" and not EXPERIMENTS[run.experiment].structure:
         return _recorded(run, rig, None)
     from acquisition.virtual_laboratory.numerical_liquid import NumericalLiquid
 
     with amounts(run.experiment) as advance:
-        numerical = NumericalLiquid(run.layers, saved, lambda share: advance(round(1000 * share), 1000))
+        numerical = NumericalLiquid(
+            run.layers,
+            saved,
+            lambda share: advance(round(1000 * share), 1000),
+            with_gas=run.liquid == "two_phase",
+        )
         return _recorded(run, rig, numerical)
 
 
@@ -289,6 +297,8 @@ def make_campaign_folder(
         Of a cluster that computes instead of processes of this machine.
     """
     _check_liquid(liquid)
+    if liquid == "two_phase":
+        raise InputError("--liquid", got="two_phase for a campaign", allowed="law, numerical")
     if liquid == "numerical":
         executor = executor_of(Where(scheduler, settings.n_workers, fresh=True), said=warn)
         return _make_numerical_campaign_folder(folder, settings, say, executor)

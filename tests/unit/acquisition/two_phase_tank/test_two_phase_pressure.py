@@ -6,7 +6,7 @@ import pytest
 from acquisition.two_phase_tank.pressure import Pressure
 
 
-@pytest.mark.parametrize("searched", [False, True])
+@pytest.mark.parametrize("searched", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_pressure_gives_the_source_back(searched: bool) -> None:
     rng, nx, nz, dx, dz = np.random.default_rng(5), 20, 12, 0.003, 0.002
     density = np.where(rng.random((nx, nz)) < 0.5, 1.2, 998.0)
