@@ -67,8 +67,8 @@ def two_phase_setup(rig: Rig, *, cells_per_height: int, seed: int, sampling_rate
     Parameters
     ----------
     rig : Rig
-        Inside of the tank, density, fill level and, where it tells them, viscosity and surface tension; what it does
-        not tell is that of water. The gas is air.
+        Inside of the tank, density, fill level and, where it tells them, viscosity and surface tension; what it
+        does not tell is that of water. The gas is air.
     cells_per_height : int
     seed : int
         Of the disturbance at the start.
