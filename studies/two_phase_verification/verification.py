@@ -14,7 +14,7 @@ from studies.numerical_tank_verification.verification_cases import Finding
 from studies.two_phase_verification.cases import dam_break, drop, faraday_threshold, rest, standing_wave
 
 QUICK: Final[tuple[Callable[[], list[Finding]], ...]] = (
-    lambda: rest(24, 60.0),
+    lambda: rest(12, 60.0),
     lambda: standing_wave(16),
     lambda: standing_wave(24),
     lambda: standing_wave(32),
@@ -27,6 +27,7 @@ QUICK: Final[tuple[Callable[[], list[Finding]], ...]] = (
     lambda: dam_break(32),
 )
 LONG: Final[tuple[Callable[[], list[Finding]], ...]] = (
+    lambda: rest(24, 60.0),
     lambda: standing_wave(48),
     lambda: drop(64),
     lambda: faraday_threshold(40),
