@@ -60,8 +60,8 @@ class TwoPhaseAccount:
         Taken when lines are drawn anew: what the interface lost in length without having pushed the fluids. It
         is negative where liquid breaks up, for the lines in the cells lengthen without work.
     place_j_per_m : float
-        Taken by the force that stands for the place of the interface between the points of the grid; negative
-        where it gives some.
+        Taken by the force that stands for the place of the interface between the points of the grid, as far as
+        the tank's motion and not gravity makes it; negative where it gives some.
     """
 
     kinetic_j_per_m: float

@@ -114,6 +114,8 @@ class Work(NamedTuple):
         Accelerations by the interface (curvature and its place between the points of the grid).
     uc, wc : ndarray
         Accelerations by curvature alone.
+    uz, wz : ndarray
+        Accelerations by the place of the interface for a body force of one upwards; what gravity does is −g of it.
     uv, wv : ndarray
         Changes of velocity by viscosity and walls.
     bx, bz : ndarray
@@ -143,6 +145,8 @@ class Work(NamedTuple):
     ws: FloatArray
     uc: FloatArray
     wc: FloatArray
+    uz: FloatArray
+    wz: FloatArray
     uv: FloatArray
     wv: FloatArray
     bx: FloatArray
@@ -181,5 +185,5 @@ def room(nx: int, nz: int) -> Work:
     nx, nz : int
     """
     cells, along, up = (nx, nz), (nx + 1, nz), (nx, nz + 1)
-    shapes = [*[cells] * 9, *[along] * 3, *[up] * 3, *[along, up] * 6]
+    shapes = [*[cells] * 9, *[along] * 3, *[up] * 3, *[along, up] * 7]
     return Work(*(np.zeros(shape) for shape in shapes))

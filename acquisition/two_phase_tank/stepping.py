@@ -203,7 +203,7 @@ def _works(state, work, body, acceleration, dt, k_, sums):  # type: ignore[no-un
             along += mean / work.bx[i, k]
             roll += mean * (fx + acceleration[0]) / work.bx[i, k]
             surface += mean * work.uc[i, k] / work.bx[i, k]
-            place += mean * (work.us[i, k] - work.uc[i, k]) / work.bx[i, k]
+            place += mean * (work.us[i, k] - work.uc[i, k] + k_.gravity * work.uz[i, k]) / work.bx[i, k]
             pressure += carried * (p[i, k] - p[i - 1, k]) / k_.dx
             pressure -= (carried - mean) * (fx + work.us[i, k]) / work.bx[i, k]
     for i in range(nx):
@@ -214,7 +214,7 @@ def _works(state, work, body, acceleration, dt, k_, sums):  # type: ignore[no-un
             up += mean / work.bz[i, k]
             roll += mean * (fz + acceleration[1] + k_.gravity) / work.bz[i, k]
             surface += mean * work.wc[i, k] / work.bz[i, k]
-            place += mean * (work.ws[i, k] - work.wc[i, k]) / work.bz[i, k]
+            place += mean * (work.ws[i, k] - work.wc[i, k] + k_.gravity * work.wz[i, k]) / work.bz[i, k]
             pressure += carried * (p[i, k] - p[i, k - 1]) / k_.dz
             pressure -= (carried - mean) * (fz + work.ws[i, k]) / work.bz[i, k]
     volume = k_.dx * k_.dz * dt
