@@ -12,7 +12,7 @@ import math
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -150,6 +150,7 @@ MAP: Final = (
     Shaking(4.0, 18.0, 36),
     Shaking(2.0, 18.0, 36),
 )
+COARSE: Final = tuple(replace(case, cells_per_height=16) for case in MAP)
 RESOLUTION: Final = tuple(Shaking(2.04, 10.7, 30, cells_per_height=cells) for cells in (16, 24, 32, 48))
 CAUSES: Final = (
     Shaking(0.5, 11.4, 100, layer_frequency_hz=5.7),
@@ -160,7 +161,7 @@ CAUSES: Final = (
     Shaking(4.0, 11.4, 30, hold=False),
     Shaking(4.0, 11.4, 30, cells_per_height=32),
 )
-POINTS: Final = {"map": MAP, "resolution": RESOLUTION, "causes": CAUSES}
+POINTS: Final = {"map": MAP, "coarse": COARSE, "resolution": RESOLUTION, "causes": CAUSES}
 
 
 def rows(results: dict[str, dict[str, Any]], cases: Sequence[Shaking]) -> list[str]:
