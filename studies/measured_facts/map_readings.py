@@ -11,7 +11,7 @@ import xarray as xr
 from sloshlab.errors import InputError
 from sloshlab.maps.map_readings import mean_along_acceleration, region_near_largest
 from sloshlab.viscous_equivalent import maximum_of
-from studies.measured_facts.published import (
+from studies.measured_facts.laboratory import (
     BEAM,
     FILLING_LEVEL,
     SHARE_OF_LARGEST,

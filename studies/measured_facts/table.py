@@ -1,7 +1,7 @@
 """What the thesis measured on its shaker, beside what an analysis of other recordings gives, as one table.
 
-The found column is computed from `windows.nc` and `maps.nc` of `sloshlab shaker`; the spread between repeats
-of one sweep is given with it.
+The found column is computed from `windows.nc` and `maps.nc` of `sloshlab shaker`, or from windows alone where a
+liquid was computed at single points; the spread between repeats of one sweep is given with it.
 """
 
 from __future__ import annotations
@@ -18,29 +18,22 @@ import xarray as xr
 from sloshlab import interrupt
 from sloshlab.errors import InputError
 from sloshlab.maps.map_readings import Region, region_near_largest
-from studies.measured_facts.map_readings import facts_of, half_filled
-from studies.measured_facts.published import (
+from studies.measured_facts.laboratory import (
     BEAM,
-    BETA_AT_WEAKEST,
+    FACTS,
     FILLING_LEVEL,
-    ISOLINE_U_BAR,
-    LARGEST,
-    MEAN_AT_BEAM_FREQUENCY,
-    PLACE_OF_LARGEST,
+    FULL_BAND,
+    ONSET_W_BAR,
     SHARE_OF_LARGEST,
-    THRESHOLD_G,
     WEAKEST_G,
 )
+from studies.measured_facts.map_readings import facts_of, half_filled
 
 FloatArray = npt.NDArray[np.float64]
 
-FULL_BAND: Final = (3.0, 5.0)
-"""Frequencies ω̄ between which levels of acceleration are compared."""
-ONSET_W_BAR: Final = 0.2
-"""W̄ from which the liquid counts as dissipating."""
-_LEVEL_TOLERANCE = 0.1
-NEAR: Final = 0.1
-"""Two values of W̄ agree if they differ by no more than this share."""
+_LEVEL_TOLERANCE: Final = 0.1
+_NEAR_FREQUENCY: Final = 0.02
+NOT_COMPUTED: Final = "not computed"
 
 
 @dataclass(frozen=True)
@@ -52,12 +45,15 @@ class Fact:
     what, published, found : str
     agrees : bool or None
         None where the source gives no number or the recordings do not reach so far.
+    name : str
+        As in ``laboratory.toml``; empty for what is no fact of the source.
     """
 
     what: str
     published: str
     found: str
     agrees: bool | None
+    name: str = ""
 
 
 @dataclass(frozen=True)
@@ -66,12 +62,14 @@ class Results:
 
     Attributes
     ----------
-    windows, maps : xarray.Dataset
+    windows : xarray.Dataset
+        As `sloshlab shaker` writes them, or of single points.
+    maps : xarray.Dataset, optional
         As `sloshlab shaker` writes them.
     """
 
     windows: xr.Dataset
-    maps: xr.Dataset
+    maps: xr.Dataset | None = None
 
     @classmethod
     def of_folder(cls, folder: Path) -> Results:
@@ -101,6 +99,8 @@ class Results:
 
     def map_of(self, fill_level: float) -> xr.Dataset | None:
         """Map of one fill level; None if it was not measured."""
+        if self.maps is None:
+            return None
         if "fill_level" not in self.maps.dims:
             return self.maps if np.isclose(self.windows.fill_level, fill_level).all() else None
         there = np.flatnonzero(np.isclose(self.maps.fill_level, fill_level))
@@ -117,11 +117,12 @@ class Results:
 
 
 def facts(results: Results) -> Iterator[Fact]:
-    """Yield all facts in the order of the source.
+    """Yield all facts in the order of the source; where a liquid tells nothing of one, it is not computed.
 
     Parameters
     ----------
     results : Results
+        Of any liquid.
     """
     makers: tuple[Callable[[Results], Iterator[Fact]], ...] = (
         _levels,
@@ -130,14 +131,29 @@ def facts(results: Results) -> Iterator[Fact]:
         _effective_mass,
         _fill_levels,
         _work,
-        _repeats,
     )
-    for make in makers:
-        yield from make(results)
+    made = {fact.name: fact for make in makers for fact in make(results)}
+    yield from (made.get(name) or _fact(name, "", None) for name in FACTS)
+    yield from _repeats(results)
+
+
+def _fact(name: str, found: str, agrees: bool | None) -> Fact:
+    """A fact of the source with what was found; nothing is found where a value is not finite."""
+    of_source = FACTS[name]
+    told = found if found and "nan" not in found else NOT_COMPUTED
+    return Fact(of_source.what, of_source.published, told, agrees if told != NOT_COMPUTED else None, name)
+
+
+def _number(name: str, value: float, found: str) -> Fact:
+    return _fact(name, found, FACTS[name].agrees(value) if np.isfinite(value) else None)
 
 
 def _mean(values: xr.DataArray) -> float:
     return float(values.mean()) if values.size else np.nan
+
+
+def _signed(text: str) -> str:
+    return text.replace("-", "−")
 
 
 def _levels(results: Results) -> Iterator[Fact]:
@@ -150,27 +166,20 @@ def _levels(results: Results) -> Iterator[Fact]:
     if above.size and above[0] > 0:
         k = above[0]
         onset = float(np.interp(ONSET_W_BAR, means[k - 1 : k + 1], levels[k - 1 : k + 1]))
-    yield Fact(
-        f"threshold: mean W̄ over ω̄ = {FULL_BAND[0]:g} … {FULL_BAND[1]:g} passes {ONSET_W_BAR:g} at",
-        f"about {THRESHOLD_G:g} g",
-        f"{onset:.2f} g",
-        bool(0.8 * THRESHOLD_G <= onset <= 1.5 * THRESHOLD_G) if np.isfinite(onset) else None,
+    yield _number("threshold", onset, f"{onset:.2f} g")
+    listed = _signed(
+        ", ".join(f"{level:g} g {round(mean, 2) + 0.0:.2f}" for level, mean in zip(levels, means, strict=True))
     )
-    listed = ", ".join(
-        f"{level:g} g {round(mean, 2) + 0.0:.2f}".replace("-", "−")
-        for level, mean in zip(levels, means, strict=True)
-    )
-    quiet = means[levels < 1]
-    yield Fact(
-        "mean W̄ there, by level", "≈ 0 below 1 g", listed, bool((quiet < 0.1).all()) if quiet.size else None
-    )
+    quiet = means[levels < FACTS["threshold"].numbers["value"]]
+    yield _fact("quiet", listed, all(FACTS["quiet"].agrees(mean) for mean in quiet) if quiet.size else None)
     best = int(np.argmax(means)) if means.size else 0
-    falls = bool(means[-1] < means[best]) if means.size and levels[-1] > 4 else None
-    yield Fact("W̄ falls again at high acceleration", "yes, beyond about 4 g", _yes(falls), falls)
+    beyond = means.size > 0 and levels[-1] > FACTS["falls"].numbers["value"]
+    falls = bool(means[-1] < means[best]) if beyond else None
+    yield _fact("falls", "" if falls is None else _yes(falls), falls)
 
 
-def _yes(value: bool | None) -> str:
-    return "not measured" if value is None else "yes" if value else "no"
+def _yes(value: bool) -> str:
+    return "yes" if value else "no"
 
 
 def _measured(maps: xr.Dataset) -> xr.DataArray:
@@ -185,52 +194,40 @@ def _maximum(results: Results) -> Iterator[Fact]:
         return
     found = facts_of(half_filled(maps)).largest
     omega_bar, u_bar = found.omega_bar, found.u_bar
-    yield Fact(
-        "maximum of W̄",
-        f"{LARGEST.w_bar:g} at ω̄ = {LARGEST.omega_bar:g}, near {LARGEST.u_bar * LARGEST.omega_bar**2:.0f} g",
-        f"{found.w_bar:.2f} at ω̄ = {omega_bar:.2f}, ū = {u_bar:.2f} ({u_bar * omega_bar**2:.1f} g)",
-        abs(found.w_bar / LARGEST.w_bar - 1) < NEAR,
-    )
-    (slow, fast), (small, large) = PLACE_OF_LARGEST
+    told = f"{found.w_bar:.2f} at ω̄ = {omega_bar:.2f}, ū = {u_bar:.2f} ({u_bar * omega_bar**2:.1f} g)"
+    yield _number("largest", found.w_bar, told)
+    numbers = FACTS["place"].numbers
+    (slow, fast), (small, large) = numbers["omega_bar_range"], numbers["u_bar_range"]
     inside = bool(slow <= omega_bar <= fast and small <= u_bar <= large)
-    place = f"ω̄ = {slow:g} … {fast:g}, ū = {small:g} … {large:g}"
-    yield Fact("its place", place, "inside" if inside else "outside", inside)
+    yield _fact("place", "inside" if inside else "outside", inside)
 
 
 def _reference_points(results: Results) -> Iterator[Fact]:
     maps = results.map_of(FILLING_LEVEL)
+    value = _at_beam(results) if maps is None else facts_of(half_filled(maps)).w_bar_of_beam
+    yield _number("beam", value, f"{value:.2f}")
     if maps is None:
         return
-    value = facts_of(half_filled(maps)).w_bar_of_beam
-    yield Fact(
-        f"W̄ at ω̄ = {BEAM.omega_bar:g} (10.7 Hz), ū = {BEAM.u_bar:g}",
-        f"{BEAM.w_bar:g}",
-        f"{value:.2f}",
-        bool(abs(value / BEAM.w_bar - 1) < NEAR) if np.isfinite(value) else None,
-    )
+    numbers = FACTS["row"].numbers
     w_bar = _measured(maps)
-    row = w_bar.to_numpy()[np.abs(maps.omega_bar.to_numpy() - BEAM.omega_bar).argmin()]
-    from_1_g = np.isfinite(row) & (maps.u_bar.to_numpy() * BEAM.omega_bar**2 >= THRESHOLD_G)
-    mean = float(row[from_1_g].mean()) if from_1_g.any() else np.nan
-    yield Fact(
-        f"mean over ū at ω̄ = {BEAM.omega_bar:g}, from {THRESHOLD_G:g} g up",
-        f"{MEAN_AT_BEAM_FREQUENCY:g}",
-        f"{mean:.2f}",
-        bool(abs(mean / MEAN_AT_BEAM_FREQUENCY - 1) < NEAR) if np.isfinite(mean) else None,
-    )
+    row = w_bar.to_numpy()[np.abs(maps.omega_bar.to_numpy() - numbers["omega_bar"]).argmin()]
+    counts = np.isfinite(row) & (maps.u_bar.to_numpy() * numbers["omega_bar"] ** 2 >= numbers["from_g"])
+    mean = float(row[counts].mean()) if counts.any() else np.nan
+    yield _number("row", mean, f"{mean:.2f}")
+
+
+def _at_beam(results: Results) -> float:
+    """W̄ of the windows at the beam's own point, where there are some."""
+    level = results.level(BEAM.u_bar * BEAM.omega_bar**2)
+    return _mean(level.w_bar[np.flatnonzero(np.abs(level.omega_bar / BEAM.omega_bar - 1) < _NEAR_FREQUENCY)])
 
 
 def _effective_mass(results: Results) -> Iterator[Fact]:
     windows = results.at(FILLING_LEVEL)
     negative = float((windows.beta < 0).mean()) if windows.sizes["window"] else np.nan
-    yield Fact("β < 0", "everywhere", f"in {100 * negative:.0f} % of the windows", negative > 0.95)
+    yield _number("effective_mass", negative, f"in {100 * negative:.0f} % of the windows")
     quiet = _mean(results.level(WEAKEST_G, band=(0.0, np.inf)).beta)
-    yield Fact(
-        f"mean β at {WEAKEST_G:g} g, all frequencies",
-        f"{BETA_AT_WEAKEST:.3f}".replace("-", "−"),
-        f"{quiet:.3f}".replace("-", "−"),
-        bool(abs(quiet - BETA_AT_WEAKEST) < 0.05) if np.isfinite(quiet) else None,
-    )
+    yield _number("weakest", quiet, _signed(f"{quiet:.3f}"))
 
 
 def _region(results: Results, fill_level: float) -> Region | None:
@@ -241,14 +238,12 @@ def _region(results: Results, fill_level: float) -> Region | None:
 def _fill_levels(results: Results) -> Iterator[Fact]:
     regions = {fill: _region(results, fill) for fill in (0.25, 0.5, 0.75)}
     known = {fill: region for fill, region in regions.items() if region is not None}
-    lowest, highest = ISOLINE_U_BAR
     for fill, region in known.items():
-        yield Fact(
-            f"region above {100 * SHARE_OF_LARGEST:.0f} % of the maximum, α = {fill:g}",
-            f"ū = {lowest:g} … {highest:g}",
+        yield _number(
+            f"region_{fill:g}",
+            region.mean_u_bar,
             f"ū = {region.lowest_u_bar:.2f} … {region.highest_u_bar:.2f}, mean {region.mean_u_bar:.2f}, "
             f"{100 * region.share:.0f} % of the measured region",
-            bool(lowest <= region.mean_u_bar <= highest),
         )
     if len(known) == 3:
         means = [known[fill].mean_u_bar for fill in (0.25, 0.5, 0.75)]
@@ -256,25 +251,23 @@ def _fill_levels(results: Results) -> Iterator[Fact]:
         moves = bool(means[0] > means[1] > means[2])
         widens = bool(shares[0] < shares[1] < shares[2])
         listed = " > ".join(f"{mean:.2f}" for mean in means)
-        yield Fact("lower α moves it to larger ū", "yes", f"{_yes(moves)} ({listed})", moves)
+        yield _fact("moves", f"{_yes(moves)} ({listed})", moves)
         listed = ", ".join(f"{100 * share:.0f} %" for share in shares)
-        yield Fact("higher α widens it", "yes", f"{_yes(widens)} ({listed})", widens)
+        yield _fact("widens", f"{_yes(widens)} ({listed})", widens)
 
 
 def _work(results: Results) -> Iterator[Fact]:
-    for level in (1.5, 3.0):
-        for frequency_hz, half_is_largest in ((9.0, True), (13.0, True), (17.0, False)):
-            work = {fill: _work_at(results, fill, level, frequency_hz) for fill in (0.25, 0.5, 0.75)}
-            if not all(np.isfinite(value) for value in work.values()):
-                continue
-            largest = max(work, key=lambda fill: work[fill])
-            listed = ", ".join(f"{1000 * value:.2f}" for value in work.values())
-            yield Fact(
-                f"α with the most work at {level:g} g, {frequency_hz:g} Hz",
-                "0.5" if half_is_largest else "not 0.5",
-                f"{largest:g} ({listed} mJ)",
-                (largest == FILLING_LEVEL) == half_is_largest,
-            )
+    for name, fact in FACTS.items():
+        if "half_filled_is_largest" not in fact.numbers:
+            continue
+        level, frequency_hz = fact.numbers["acceleration_g"], fact.numbers["frequency_hz"]
+        work = {fill: _work_at(results, fill, level, frequency_hz) for fill in (0.25, 0.5, 0.75)}
+        if not all(np.isfinite(value) for value in work.values()):
+            continue
+        largest = max(work, key=lambda fill: work[fill])
+        listed = ", ".join(f"{1000 * value:.2f}" for value in work.values())
+        agrees = (largest == FILLING_LEVEL) == fact.numbers["half_filled_is_largest"]
+        yield _fact(name, f"{largest:g} ({listed} mJ)", agrees)
 
 
 def _work_at(results: Results, fill_level: float, level: float, frequency_hz: float) -> float:

@@ -11,8 +11,7 @@ from pipelines.report.style import REFERENCE_COLOUR, drawing_style, new_figure, 
 from pipelines.sweep.figures_maps import MapField, draw_map, scaled_field, shades
 from pipelines.sweep.planes import arrange_plane, draw_iso_acceleration
 from sloshlab.rig import Rig
-from studies.measured_facts.map_readings import FactsOfMap, facts_of, half_filled
-from studies.measured_facts.published import (
+from studies.measured_facts.laboratory import (
     BEAM,
     BETA_AT_WEAKEST,
     ISOLINE_U_BAR,
@@ -20,6 +19,7 @@ from studies.measured_facts.published import (
     SHARE_OF_LARGEST,
     WEAKEST_G,
 )
+from studies.measured_facts.map_readings import FactsOfMap, facts_of, half_filled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
