@@ -31,7 +31,7 @@ DOCS_BRANCH ?= gh-pages
 export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks aircraft wing rom-study closed-loop replay campaign tank-campaign tank-scaling pictures tank-diagnosis trial flight-trial rivals test test-newest test-all lint format type bench bench-history fuzz soak wheel docs docs-publish clean
+.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks aircraft wing rom-study closed-loop replay campaign tank-campaign tank-scaling pictures tank-diagnosis trial flight-trial rivals test test-newest test-all lint format type bench bench-history fuzz soak wheel docs docs-publish clean tank-reference
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -122,6 +122,9 @@ pictures: setup  ## the snapshots and the film of the numerical tank in docs/ima
 
 tank-diagnosis: setup  ## what twins with simpler liquids leave out of the numerical tank's recordings (minutes)
 	$(BIN)/python -m studies.tank_diagnosis raw_data/numerical_tank $(RESULTS)/tank_diagnosis
+
+tank-reference: setup  ## OpenFOAM's tank beside the numerical one (hours; needs interFoam; goes on where it was stopped)
+	$(BIN)/python -m studies.tank_reference $(RESULTS)/tank_reference
 
 trial: setup  ## a blind trial, sealed, diagnosed and scored (hours; goes on where it was stopped)
 	test -f $(RESULTS)/trial/commitments.json || $(BIN)/sloshlab trial seal -o $(RESULTS)/trial --seed $(TRIAL_SEED) --key $(TRIAL_KEY)
