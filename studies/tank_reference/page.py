@@ -19,6 +19,7 @@ from studies.tank_reference.comparison import (
     values_of,
 )
 from studies.tank_reference.diagnosis import misfit_table, verdict, verdict_table
+from studies.tank_reference.dry_mass import balance_table, shifted_balance
 from studies.tank_reference.interfoam_case import InterfoamCase
 from studies.tank_reference.kept_results import KeptResult
 from studies.tank_reference.particle_runs import ParticleCase, ParticleResult
@@ -153,3 +154,6 @@ def tables(
     )
     yield ""
     yield from fact_table(present, {name: liquid for name, liquid in shown.items() if name.count("/") < 2})
+    if present is not None:
+        yield ""
+        yield from balance_table(shifted_balance(present))

@@ -34,7 +34,7 @@ class MeanOverCycles:
 
         Examples
         --------
-        >>> str(MeanOverCycles(-0.123, 0.045)), str(MeanOverCycles(1.0, float("nan")))
+        >>> str(MeanOverCycles(-0.123, 0.047)), str(MeanOverCycles(1.0, float("nan")))
         ('−0.12 ± 0.05', '1.00')
         """
         error = "" if math.isnan(self.standard_error) else f" ± {self.standard_error:.2f}"

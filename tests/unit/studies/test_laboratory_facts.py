@@ -7,6 +7,7 @@ import xarray as xr
 from sloshlab.errors import InputError
 from studies.measured_facts.laboratory import BEAM, FACTS, LARGEST, laboratory_facts
 from studies.measured_facts.table import NOT_COMPUTED, Results, facts
+from studies.tank_reference.dry_mass import balance_table, shifted_balance
 
 ENTRY = {"name": "a", "where": "1.4", "half": "judges", "what": "W̄", "published": "1", "value": 1.0, "share": 0.1}
 
@@ -92,3 +93,12 @@ def test_beam_is_judged_at_its_own_point() -> None:
     }
     assert found["beam"].found == "1.40"
     assert found["beam"].agrees is True
+
+
+def test_a_shift_is_chosen_by_one_fact_and_judged_by_another() -> None:
+    """Mean β at 0.25 g is −0.1, so that −0.054 is added: of 0.03 and 0.08 at 2 g the first becomes negative."""
+    level = np.array([0.25, 0.25, 2.0, 2.0])
+    found = shifted_balance(Results(windows(level, 11.4, 1.0, np.array([-0.15, -0.05, 0.03, 0.08]))))
+    assert found.shift == pytest.approx(-0.054)
+    assert (found.before.found, found.after.found) == ("in 50 % of the windows", "in 75 % of the windows")
+    assert next(iter(balance_table(found))).endswith("shifted by −0.054 |")

@@ -38,7 +38,7 @@ OMEGA = 2 * math.pi * 10
 def tables(folder, case=CASE, *, share=0.3, beta=-0.2, lost=0.0):
     """What OpenFOAM writes of a liquid whose force is −m_l (1 + β) ü − γ u̇, with W̄ = πγ/(m_l Ω) = `share`."""
     rng = np.random.default_rng(1)
-    times = np.cumsum(rng.uniform(0.5, 1.5, 500 * case.n_cycles))
+    times = np.cumsum(rng.uniform(0.5, 1.5, 200 * case.n_cycles))
     times *= case.duration_s / times[-1]
     amplitude = AMPLITUDE * np.clip(times * 10 / 3, 0, 1)
     acceleration = amplitude * np.cos(OMEGA * times)
@@ -126,7 +126,7 @@ def test_acceleration_of_a_case_is_that_of_the_numerical_tank() -> None:
 
 def test_every_change_changes_what_is_computed_from() -> None:
     hashes = {inputs_hash(replace(CASE, **change)) for change in CHANGES.values()}
-    assert len(hashes | {inputs_hash(CASE), inputs_hash(replace(CASE, seed=1))}) == len(CHANGES) + 2
+    assert len(hashes | {inputs_hash(CASE)}) == len(CHANGES) + 1
     assert "@" not in "".join(case_files(CASE).values())
 
 
@@ -204,6 +204,9 @@ def test_tables_have_a_line_for_every_point() -> None:
     assert any(line.startswith("| everything |") for line in change_table(results))
     windows = results_at_points(liquids["reference"]).windows
     assert windows.sizes["window"] == len(liquids["reference"])
+    # W = W̄ m_l (a₀/Ω)²
+    work = windows.w_bar * MASS * (windows.acceleration_g * 9.81 / (2 * np.pi * windows.frequency_hz)) ** 2
+    np.testing.assert_allclose(windows.work_j, work, rtol=1e-6)
 
 
 def test_laboratory_tells_of_three_points() -> None:
