@@ -106,6 +106,7 @@ class Structure(_Described):
     stiffness_n_per_m: Stiffness | None = None
     coulomb_force_n: Friction | None = None
     damping_kg_per_s: Damping | None = None
+    spring_mass_kg: Mass | None = None
 
     @model_validator(mode="after")
     def _complete_for_its_kind(self) -> Structure:

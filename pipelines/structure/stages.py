@@ -24,6 +24,7 @@ from sloshlab.conditioning.combined_channels import (
 )
 from sloshlab.conditioning.gaps import longest_whole_stretch
 from sloshlab.conditioning.quality import RunQuality, quality_of
+from sloshlab.conditioning.spring_inertia import at_the_tank
 from sloshlab.consistency.examination import Reference
 from sloshlab.consistency.finding import ConsistencyExamination
 from sloshlab.errors import AnalysisError
@@ -107,6 +108,8 @@ def loaded(path: RunSource, recording: xr.Dataset, rig: Rig) -> Loaded:
             path, recording, attributes, quality_of(recording), ConsistencyExamination(attributes.run_id)
         )
     quality = require_usable(recording, path)
+    # of recordings only: a twin's force is that on the tank
+    recording = at_the_tank(recording, rig)
     recording, examination = examined_recording(recording, path, Reference(rig))
     return Loaded(path, recording, attributes, quality, examination)
 
