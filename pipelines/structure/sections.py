@@ -14,6 +14,7 @@ from pipelines.report.sections import FigurePlan, SectionPlan
 from pipelines.report.tables import Table, channel_table, consistency_tables, provenance_table, remark_table
 from pipelines.structure import (
     figures_decay,
+    figures_oscillator,
     figures_signals,
     figures_spectra,
     figures_twin,
@@ -132,6 +133,8 @@ def _random_section(experiment: BeamExperiment) -> SectionPlan:
         "densities": figures_spectra.densities,
         "frequency_responses": figures_spectra.frequency_responses,
         "damping_over_rms": figures_spectra.damping_over_rms,
+        "amplitude_and_phase": figures_oscillator.amplitude_and_phase,
+        "work_of_cycle": figures_oscillator.work_of_cycle,
     }
     drawn = tuple(FigurePlan(name, partial(draw, experiment=experiment)) for name, draw in plans.items())
     return SectionPlan("Random motion", drawn, _present(tables.random_table(experiment)))

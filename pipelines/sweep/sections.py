@@ -17,6 +17,7 @@ from pipelines.sweep import (
     figures_response,
     figures_runs,
     figures_signals,
+    figures_viscous,
     figures_work,
     tables,
     touchable_maps,
@@ -77,6 +78,7 @@ def _rig_section(experiment: SweepExperiment, rig: RigResult, prefix: str) -> Se
         "work_map": partial(figures_maps.work_map, maps=rig.maps, runs=runs, counterpart=source["work"]),
         "over_velocity": partial(figures_maps.over_velocity, rig=rig, runs=runs),
         "uncertainty": partial(figures_maps.uncertainty_maps, maps=rig.maps, rig=rig),
+        "viscous_map": partial(figures_viscous.viscous_map, rig=rig, runs=runs),
         "regimes": partial(figures_regimes.regime_map, rig=rig, runs=runs),
         "harmonics": partial(figures_regimes.harmonics, runs=runs, with_liquid=True),
     }

@@ -24,7 +24,7 @@ from synthetic_experiment import (
 from pipelines.report.figure import NothingToDrawError
 from pipelines.report.style import drawing_style, new_figure
 from pipelines.report.tables import channel_table, provenance_table
-from pipelines.sweep import figures_maps, figures_quality, selection, summary, tables
+from pipelines.sweep import figures_maps, figures_quality, figures_viscous, selection, summary, tables
 from pipelines.sweep.figures_response import responses
 from pipelines.sweep.figures_signals import signal_panels
 from pipelines.sweep.figures_work import fill_curves, work_bars
@@ -268,6 +268,17 @@ def test_a_map_is_drawn_inside_the_measured_region_only() -> None:
     assert bright[2] < 80
     assert np.ptp(empty) < 6  # grey
     assert empty.min() > 225
+
+
+def test_viscous_damping_of_the_map_is_that_of_its_work() -> None:
+    """A damper c takes π c u₀² Ω per cycle (E.2); the work of the map is W̄ m_l u₀² Ω²."""
+    [rig_result] = shaker_experiment((0.5,), (2.0,)).rigs
+    field = figures_viscous.viscous_field(rig_result)
+    w_bar = rig_result.maps.dataset["w_bar"].transpose("omega_bar", "u_bar")
+    omega = rig_result.maps.dataset["omega_bar"].values[:, None] * np.sqrt(9.81 / rig_result.rig.tank.height_m)
+    work = w_bar.values * rig_result.rig.liquid_mass_kg * omega**2  # per u₀²
+    assert np.isfinite(field.values).any()
+    np.testing.assert_allclose(np.pi * field.values * omega, work, rtol=1e-9)
 
 
 def _rendered(figure: object) -> np.ndarray:
