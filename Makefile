@@ -19,6 +19,7 @@ ROM := $(RESULTS)/rom/ROM.nc
 MAPS := $(RESULTS)/shaker/maps.nc
 SCALING_ROM := $(RESULTS)/tank_scaling/ROM_60x20.nc
 BALLS :=
+BALL := $(RESULTS)/bouncing_ball/decay_contact/ball.toml
 PATIENCE ?= 30
 FUZZ_SECONDS ?= 600
 # one more than cores: tests of devices wait for a clock most of their time
@@ -31,7 +32,7 @@ DOCS_BRANCH ?= gh-pages
 export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks aircraft wing rom-study closed-loop replay campaign tank-campaign tank-scaling pictures tank-diagnosis trial flight-trial rivals test test-newest test-all lint format type bench bench-history fuzz soak wheel docs docs-publish clean tank-reference
+.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks aircraft wing rom-study closed-loop replay campaign tank-campaign tank-scaling pictures tank-diagnosis trial flight-trial rivals test test-newest test-all lint format type bench bench-history fuzz soak wheel docs docs-publish clean tank-reference ball-network
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -72,6 +73,12 @@ sdof: setup  ## the guided tank of raw_data/numerical_tank: damping and report
 
 bouncing-ball: setup  ## bouncing balls in place of the liquid of raw_data: parameters, maps, errors, reports (minutes)
 	$(BIN)/python -m pipelines.experiments ball raw_data $(RESULTS)/bouncing_ball
+
+ball-network: setup  ## a network that learns from a bouncing ball (7 x 35), in place of the liquid: report (minutes)
+	test -f $(BALL) || $(BIN)/sloshlab ball raw_data/numerical_tank/sdof/decay_*.nc \
+	  --rig raw_data/numerical_tank/sdof/rig_sdof.toml -o $(dir $(BALL)) || [ $$? -eq 3 ]
+	$(BIN)/sloshlab ball-network raw_data/numerical_tank/sdof/decay_*.nc --ball $(BALL) \
+	  --rig raw_data/numerical_tank/sdof/rig_sdof.toml -o $(RESULTS)/ball_network || [ $$? -eq 3 ]
 
 rom: setup  ## the reduced-order model (70 delays, 35 neurons) of raw_data/numerical_tank and its validation report (minutes)
 	$(BIN)/python -m pipelines.experiments rom raw_data/numerical_tank/shaker $(RESULTS)/rom

@@ -134,6 +134,10 @@ QUANTITIES: Final[dict[str, Quantity]] = {
     "ball_value_high": Quantity("1", "upper end of the 90 % interval of a parameter of a ball, ∞ if it has none"),
     "ball_profile_ratio": Quantity("1", "growth of the sum of squares at the ends over the predicted one"),
     "ball_damping_ratio": Quantity("1", "share of critical damping with the ball, at the measured amplitudes"),
+    "network_damping_ratio": Quantity(
+        "1", "share of critical damping with the network, at the measured amplitudes"
+    ),
+    "network_loss_factor": Quantity("1", "loss factor of the network in steady harmonic motion"),
     "ball_w_bar": Quantity("1", "W̄ of the ball at the frequency and amplitude of each window"),
     "start_number": Quantity("1", "which start of the training, from 0"),
     "epoch_number": Quantity("1", "epoch within a start; 0 is before the first step"),

@@ -14,7 +14,7 @@ from pipelines.report.tables import Table, provenance_table
 from sloshlab import __version__
 from sloshlab.bouncing_ball.frequency_error import summary
 
-_BALL = Citation(
+BALL = Citation(
     "bouncing ball (2.1–2.21)",
     "M. Pizzoli, F. Saltari, F. Mastroddi, J. Martínez-Carrascal, L. González-Gutiérrez: Nonlinear reduced-order "
     "model for vertical sloshing by employing neural networks. Nonlinear Dynamics (2021).",
@@ -44,7 +44,7 @@ def page_of(experiment: BallExperiment) -> Page:
         flags=experiment.flags,
         summary=_sentences(experiment),
         plans=(found, *plans, provenance),
-        papers=(_BALL, _EVOLUTION, *citation("work")),
+        papers=(BALL, _EVOLUTION, *citation("work")),
     )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pipelines.ball.decay_stages import ball_from_decays
+from pipelines.ball.decays import are_decays
 from pipelines.ball.line_stages import ball_from_shaker
 from pipelines.ball.results import BallExperiment
 from pipelines.ball.settings import BallSettings
@@ -34,7 +35,7 @@ def analyse_ball(paths: Sequence[Path], rig_path: Path, settings: BallSettings) 
     rig = Rig.from_toml(rig_path)
     described = [(path, read_attributes(path)) for path in paths]
     experiments = [EXPERIMENTS[run.experiment] for _, run in described]
-    decays = all(known.moves == "release" and known.structure == "sdof" for known in experiments)
+    decays = are_decays(described)
     if not decays and not all(known.moves == "shaker" for known in experiments):
         raise AnalysisError(
             "runs for a ball",

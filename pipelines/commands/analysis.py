@@ -186,3 +186,40 @@ def ball(
     require_result_folder(output, files_of(report=not no_report))
     experiment = analyse_ball(runs, rig, settings)
     finish(write_ball(experiment, output, command=command_as_given(), report=not no_report), as_json)
+
+
+@app.command("ball-network")
+def ball_network(
+    runs: Recordings,
+    rig: Annotated[
+        Path, typer.Option("--rig", metavar="RIG.toml", help="Rig that the runs belong to.", show_default=False)
+    ],
+    ball_table: Annotated[
+        Path, typer.Option("--ball", metavar="ball.toml", help="Ball that the network learns.", show_default=False)
+    ],
+    output: OutputFolder,
+    *,
+    duration_s: Annotated[float, typer.Option(help="Length of the run of the ball that it learns from.")] = 200.0,
+    rate_hz: Annotated[float, typer.Option(help="Rate of that run and of the network.")] = 1000.0,
+    delays: Annotated[int, typer.Option(min=1, help="Past velocities that the network sees.")] = 50,
+    layers: Annotated[int, typer.Option(min=1, help="Hidden layers.")] = 7,
+    neurons: Annotated[int, typer.Option(min=1, help="Neurons of each.")] = 35,
+    steps: Annotated[int, typer.Option(min=1, help="Of the training, at most so many.")] = 1500,
+    every: Annotated[int, typer.Option(min=1, help="One sample in so many is a target of the training.")] = 20,
+    seed: Annotated[int, typer.Option(min=0, help="Of the start.")] = 0,
+    no_report: Annotated[bool, typer.Option("--no-report", help="Write ROM.nc and network.nc only.")] = False,
+    as_json: Json = False,
+) -> None:
+    """A network that learns from a bouncing ball, in place of the liquid of free decays (Appendix C)."""
+    require_recordings(runs)
+    from pipelines.ball.network_outputs import files_of, write_ball_network
+    from pipelines.ball.network_results import BallNetworkSettings
+    from pipelines.ball.network_stages import network_of_ball
+    from sloshlab.reduced_order_model.gradient_training import GradientSettings
+
+    require_result_folder(output, files_of(report=not no_report))
+    training = GradientSettings(n_steps=steps, every=every, seed=seed)
+    settings = BallNetworkSettings(duration_s, rate_hz, delays, layers, neurons, training)
+    learnt = network_of_ball(runs, rig, ball_table, settings)
+    summary = write_ball_network(learnt, output, command=command_as_given(), report=not no_report)
+    finish(summary, as_json)

@@ -44,6 +44,7 @@ EXAMPLES: Final[dict[str, tuple[str, ...]]] = {
         "sloshlab ball decay_1.nc decay_2.nc --rig rig.toml -o results",
         "sloshlab ball sweep_*.nc --rig rig.toml -o results --omega-bar 4",
     ),
+    "ball-network": ("sloshlab ball-network decay_*.nc --rig rig.toml --ball ball.toml -o results",),
     "train": (
         "sloshlab train vfa_1.nc vfa_2.nc valid.nc --rig rig.toml -o rom.nc",
         "sloshlab train vfa_*.nc valid.nc --rig rig.toml --still empty.nc --test sweep_3g.nc -o rom.nc",

@@ -5,11 +5,16 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
+
+from pydantic import ValidationError
 
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.errors import InputError, RigError
 from sloshlab.rig import Rig
+from sloshlab.rig import Twin as RigTwin
+from sloshlab.toml_file import read_toml
 from sloshlab.twin.tank_forces import BOUNCING_BALL
 from sloshlab.twin.terms import Term
 from sloshlab.twin.twin import Twin
@@ -60,6 +65,25 @@ class BouncingBall:
         (term,) = Twin.from_rig(rig).tank_alone().terms
         names = [parameter.name for parameter in dataclasses.fields(cls)]
         return cls(**{name: term.values[name] for name in names})
+
+    @classmethod
+    def from_toml(cls, path: Path, rig: Rig) -> BouncingBall:
+        """The ball of a file of `sloshlab ball`, in the tank of a rig.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read, holds no table of a ball, or its ball does not fit into the tank.
+        """
+        document = read_toml(path, f"ball {path}")
+        try:
+            table = RigTwin.model_validate(document["twin"])
+        except (KeyError, ValidationError) as error:
+            reason = " ".join(str(error).split())[:120]
+            raise InputError(
+                f"ball {path}", got=f"no table of a ball ({reason})", allowed="a ball.toml of `sloshlab ball`"
+            ) from None
+        return cls.from_rig(rig.model_copy(update={"twin": table}))
 
     @classmethod
     def from_non_dimensional(

@@ -178,7 +178,7 @@ def fit(
     """
     chosen = settings or TrainingSettings()
     # of the training runs only: the validation run decides when to stop and between starts, nothing else
-    scaling = _scaling(training, validation, delays, chosen)
+    scaling = fitted_scaling(training, validation, delays, chosen)
     if agitation is not None:
         agitation = agitation.fitted([run.x for run in training], sampling_rate_hz)
         delays = replace(delays, n_states=agitation.n_states)
@@ -370,10 +370,26 @@ def _free_squares(network: Network, delays: Delays, theta: FloatArray, runs: Seq
     return squares
 
 
-def _scaling(
+def fitted_scaling(
     training: Sequence[Run], validation: Sequence[Run], delays: Delays, settings: TrainingSettings
 ) -> Scaling:
-    """Scale so that all regressors together have the wanted spread and the output is of size one."""
+    """Scale so that all regressors together have the wanted spread and the output is of size one.
+
+    Parameters
+    ----------
+    training, validation : sequence of Run
+        The training runs give the scales; of both there must be samples.
+    delays : Delays
+    settings : TrainingSettings
+        Its `input_spread`.
+
+    Raises
+    ------
+    InputError
+        If no stretch of either is longer than the delays.
+    AnalysisError
+        If input or output is constant.
+    """
     for what, runs in (("training", training), ("validation", validation)):
         if not n_samples(runs, delays):
             longest = max((run.x.size for run in runs), default=0)

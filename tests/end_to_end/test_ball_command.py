@@ -97,6 +97,54 @@ def test_files_of_a_decay(tmp_path: Path, rig: Path, capsys: pytest.CaptureFixtu
         assert result["loss_factor"].attrs["long_name"]
 
 
+def network_arguments(tmp_path: Path, rig: Path) -> list[str]:
+    """A small network of the ball of `ball_decay`, beside a decay with that very ball."""
+    ball = tmp_path / "ball.toml"
+    ball.write_text(BouncingBall(0.0244, 1103.0, 13.04, 74.04, 0.0017).twin_table(), encoding="utf-8")
+    recording = write_decay(tmp_path / "decay.nc", *ball_decay())
+    return ["ball-network", str(recording), "--rig", str(rig), "--ball", str(ball), "-o", str(tmp_path / "out")]
+
+
+@pytest.mark.slow
+def test_a_network_learns_from_a_ball(tmp_path: Path, rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The recorded decay is one of the ball: what the network misses of it, it misses of the ball."""
+    given = network_arguments(tmp_path, rig)
+    small = ["--duration-s", "20", "--layers", "2", "--neurons", "12", "--steps", "200", "--rate-hz", "500"]
+    assert run([*given, *small, "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out.strip().splitlines()[-1])
+    out = tmp_path / "out"
+    with xr.open_dataset(out / "network.nc") as result:
+        # the ball in the loop decays as the recording that it made
+        ball, recorded = result["ball_damping_ratio"].values, result["damping_ratio"].values
+        assert ball == pytest.approx(recorded, abs=2e-4)
+        error = 100 * np.sqrt(((result["network_damping_ratio"].values - ball) ** 2).mean())
+        assert error == pytest.approx(summary["damping_error_to_ball_percent"], rel=1e-6)
+        assert error < 2.0
+        assert result["network_loss_factor"].shape == result["loss_factor"].shape
+    assert summary["fit_percent"] > 40
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "Printed and reached" in page
+    for name in ("scheme", "training_path", "training_errors", "open_loop", "decays", "loss_factors"):
+        assert (out / "figures" / f"{name}.png").is_file()
+    # the network is a model like any other
+    rom_rig = tmp_path / "rom.toml"
+    rom_rig.write_text(
+        RIG + f'[twin]\ntank_model = "rom"\nparameters = {{rom = "{out / "ROM.nc"}"}}\n', encoding="utf-8"
+    )
+    simulated = ["simulate", "--rig", str(rom_rig), "--input", given[1], "-o", str(tmp_path / "sim.nc")]
+    assert run(simulated) in (0, 3)
+
+
+def test_a_network_of_another_file_than_a_ball(
+    tmp_path: Path, rig: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = network_arguments(tmp_path, rig)
+    (tmp_path / "ball.toml").write_text("[tank]\n", encoding="utf-8")
+    line = refused(capsys, *given)
+    assert "allowed: a ball.toml of `sloshlab ball`" in line
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.slow
 def test_the_frozen_decay_gives_the_guide(tmp_path: Path, rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The true guide has 0.30 N and 1.20 kg/s; the rig file says 0.37 and 1.58."""

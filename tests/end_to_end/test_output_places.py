@@ -19,6 +19,7 @@ FOLDERS: dict[str, list[str]] = {
     "work -o": ["work", *RUN, "--force", "f", "--acceleration", "a"],
     "beam -o": ["beam", *RUN, *RIG],
     "ball -o": ["ball", *RUN, *RIG],
+    "ball-network -o": ["ball-network", *RUN, *RIG, "--ball", "absent_ball.toml"],
     "validate -o": ["validate", "absent_rom.nc", *RUN, *RIG],
     "study -o": ["study", *RUN, *RUN, *RIG],
     "diagnose -o": ["diagnose", "absent"],

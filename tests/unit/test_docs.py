@@ -59,8 +59,8 @@ def tracked_text_files() -> list[Path]:
 
 def test_the_documented_commands_are_those_of_the_program() -> None:
     text = (DOCS / "commands.md").read_text(encoding="utf-8")
-    assert re.findall(r"^## sloshlab (\w+)$", text, flags=re.MULTILINE) == list(COMMANDS)
-    assert set(re.findall(r"^\| `sloshlab (\w+)", text, flags=re.MULTILINE)) == set(COMMANDS)
+    assert re.findall(r"^## sloshlab ([\w-]+)$", text, flags=re.MULTILINE) == list(COMMANDS)
+    assert set(re.findall(r"^\| `sloshlab ([\w-]+)", text, flags=re.MULTILINE)) == set(COMMANDS)
 
 
 @pytest.mark.parametrize("command", COMMANDS)

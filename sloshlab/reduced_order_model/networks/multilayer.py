@@ -136,6 +136,19 @@ class Multilayer:
             rows.append(sensitivity)
         return theta[-self.n_linear :] @ features, xp.concat([*rows, features], axis=0)
 
+    def squares_and_gradient(self, xp: Any, theta: Array, phi: Array, target: Array) -> tuple[float, Array]:
+        """Return Σ e² and its derivative by θ, by one pass backwards and without the Jacobian."""
+        values, slopes = self._forward(xp, theta, phi)
+        weights = self._weights(xp, theta)
+        error = (weights[-1][0] @ values[-1])[0, :] + weights[-1][1] - target
+        excess, parts = 2 * error[None, :], list[Array]()
+        for layer in range(len(weights) - 1, -1, -1):
+            by_matrix = xp.reshape(excess @ values[layer].T, (-1,))
+            parts = [by_matrix, xp.sum(excess, axis=1), *parts]
+            if layer:
+                excess = (weights[layer][0].T @ excess) * slopes[layer - 1]
+        return float(xp.sum(error * error)), xp.concat(parts)
+
     def input_gradient(self, xp: Any, theta: Array, phi: Array) -> Array:
         """Return ∂ŷ/∂φ, shape (n_inputs, m)."""
         _, slopes = self._forward(xp, theta, phi)

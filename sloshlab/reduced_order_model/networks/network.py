@@ -91,6 +91,10 @@ class Network(Protocol):
         """Return outputs, shape (m,), and their derivatives, shape (n_parameters, m)."""
         ...
 
+    def squares_and_gradient(self, xp: Any, theta: Array, phi: Array, target: Array) -> tuple[float, Array]:
+        """Return Σ e² of wanted outputs, shape (m,), and its derivative by θ, shape (n_parameters,)."""
+        ...
+
     def input_gradient(self, xp: Any, theta: Array, phi: Array) -> Array:
         """Return the derivatives of the outputs by the regressors, shape (n_inputs, m)."""
         ...

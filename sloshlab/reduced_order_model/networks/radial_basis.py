@@ -108,6 +108,16 @@ class _RadialBasisNetwork:
         rows = xp.reshape(by_centres, (self.n_neurons * self.n_inputs, phi.shape[1]))
         return output, xp.concat([rows, features], axis=0)
 
+    def squares_and_gradient(self, xp: Any, theta: Array, phi: Array, target: Array) -> tuple[float, Array]:
+        """Return Σ e² and its derivative by θ, without the Jacobian."""
+        centres, _ = self.parts(xp, theta)
+        features, output, factors = self.evaluated(xp, theta, phi)
+        error = output - target
+        weighted = factors * error[None, :]
+        by_centres = weighted @ phi.T - xp.sum(weighted, axis=1)[:, None] * centres
+        gradient = xp.concat([xp.reshape(by_centres, (-1,)), features @ error])
+        return float(xp.sum(error * error)), 2 * gradient
+
     def input_gradient(self, xp: Any, theta: Array, phi: Array) -> Array:
         """Return ∂ŷ/∂φ, shape (n_inputs, m): moving the sample is moving all centres the other way."""
         centres, _ = self.parts(xp, theta)

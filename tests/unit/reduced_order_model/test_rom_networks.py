@@ -57,6 +57,16 @@ def test_slope_along_the_regressors_is_the_difference_quotient(case):
     assert np.abs(gradient - quotients).max() < 1e-6 * max(np.abs(gradient).max(), 1)
 
 
+def test_gradient_without_the_jacobian_is_that_of_the_jacobian(case):
+    """Another route: Σ e² by outputs, and its slope −2 J (target − output) by the whole Jacobian."""
+    network, theta, phi, target = case
+    output, jacobian = network.jacobian(xp, theta, phi)
+    squares, gradient = network.squares_and_gradient(xp, theta, phi, target)
+    assert squares == pytest.approx(np.sum((target - output) ** 2))
+    expected = -2 * jacobian @ (target - output)
+    assert np.abs(gradient - expected).max() < 1e-12 * np.abs(expected).max()
+
+
 def test_output_is_linear_in_the_last_parameters(case):
     network, theta, phi, _ = case
     features = network.linear_features(xp, theta, phi)
