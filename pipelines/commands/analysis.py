@@ -124,6 +124,10 @@ def beam(
         list[Path] | None,
         typer.Option("--ball", metavar="ball.toml", help="Ball to simulate the runs with.", show_default=False),
     ] = None,
+    ensemble: Annotated[
+        Path | None,
+        typer.Option(metavar="ENSEMBLE.nc", help="Models whose spread is carried into ζ₁.", show_default=False),
+    ] = None,
     twins: Annotated[
         bool, typer.Option("--twins", help="Simulate the sloshing runs with frozen liquid and dampers, too.")
     ] = False,
@@ -139,9 +143,9 @@ def beam(
     settings = checked_settings(modes=modes, n_cycles=cycles, segment_s=segment_s)
     require_result_folder(output, files_of(report=not no_report))
     simulated: dict[str, bytes] = {}
-    if twins or rom or ball_table:
+    if twins or rom or ball_table or ensemble:
         experiment, simulated = analyse_beam_with_twins(
-            runs, rig, settings, roms=rom or [], balls=ball_table or []
+            runs, rig, settings, roms=rom or [], balls=ball_table or [], ensemble=ensemble
         )
     else:
         experiment = analyse_beam(runs, rig, settings)

@@ -309,6 +309,11 @@ def _summary(experiment: BeamExperiment, folder: Path, report: bool) -> dict[str
             "tip_mass_kg": experiment.updated.beam.tip_mass_kg,
             "youngs_modulus_pa": experiment.updated.beam.youngs_modulus_pa,
         },
+        **(
+            {"network_uncertainty": experiment.network_uncertainty.summary()}
+            if experiment.network_uncertainty
+            else {}
+        ),
         "output": str(folder),
     }
 

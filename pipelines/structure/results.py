@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from pipelines.inputs.recordings import RunSource
 from pipelines.inputs.rigs import RigSource
+from pipelines.structure.uncertain_damping import NetworkUncertainty
 from sloshlab.conditioning.calibration import ApparentMass
 from sloshlab.conditioning.quality import RunQuality
 from sloshlab.configurations import EMPTY, FROZEN, SLOSHING
@@ -248,6 +249,8 @@ class BeamExperiment:
         Input hashes, versions and the command.
     flags : tuple of str
         Of all runs and of the experiment; if not empty the exit code is 3.
+    network_uncertainty : NetworkUncertainty or None
+        ζ₁ by the members of an ensemble, if one was given.
     """
 
     title: str
@@ -265,6 +268,7 @@ class BeamExperiment:
     inputs: tuple[RunSource | RigSource, ...]
     provenance: dict[str, Any] = field(default_factory=dict)
     flags: tuple[str, ...] = ()
+    network_uncertainty: NetworkUncertainty | None = None
 
     @property
     def free_runs(self) -> tuple[BeamRun, ...]:

@@ -24,6 +24,7 @@ from pipelines.structure import (
 )
 from pipelines.structure.results import BeamExperiment
 from pipelines.structure.summary import sentences
+from pipelines.structure.uncertain_damping import uncertainty_table
 from sloshlab import __version__
 from sloshlab.experiments import EXPERIMENTS
 
@@ -121,7 +122,10 @@ def _twin_section(experiment: BeamExperiment) -> SectionPlan:
         plans["random_against_twins"] = figures_twin.random_against_twins
     drawn = tuple(FigurePlan(name, partial(draw, experiment=experiment)) for name, draw in plans.items())
     shown = _present(
-        tables.twin_table(experiment), twin_damping.decay_table(experiment), twin_damping.random_table(experiment)
+        tables.twin_table(experiment),
+        twin_damping.decay_table(experiment),
+        twin_damping.random_table(experiment),
+        uncertainty_table(experiment.network_uncertainty) if experiment.network_uncertainty else None,
     )
     return SectionPlan("Twins", drawn, shown)
 

@@ -106,7 +106,7 @@ def random_table(experiment: BeamExperiment) -> Table | None:
     levels: list[tuple[BeamRun, dict[str, BeamRun]]] = [
         (measured, {run.group: run for run in simulated})
         for measured, simulated in pairs_of(experiment, experiment.random_runs)
-        if _fitted(measured) is not None
+        if fitted_damping(measured) is not None
     ]
     if not levels:
         return None
@@ -115,7 +115,7 @@ def random_table(experiment: BeamExperiment) -> Table | None:
     for group in groups:
         cells = [_random_cell(measured, simulated.get(group)) for measured, simulated in levels]
         rows.append((group, *cells))
-    measured_cells = [text(100 * (_fitted(measured) or np.nan)) for measured, _ in levels]
+    measured_cells = [text(100 * (fitted_damping(measured) or np.nan)) for measured, _ in levels]
     header = ("twin", *(f"ζ₁ at {measured.level_text} [%]" for measured, _ in levels))
     note = (
         "From the density of the tank's acceleration alone, in parentheses the deviation from the recording. The "
@@ -127,11 +127,12 @@ def random_table(experiment: BeamExperiment) -> Table | None:
     )
 
 
-def _fitted(run: BeamRun | None) -> float | None:
+def fitted_damping(run: BeamRun | None) -> float | None:
+    """ζ₁ from the density of the tank's acceleration alone; None where no mode was found in it."""
     fit = run.random.density_fit if run is not None and run.random is not None else None
     return None if fit is None else fit.damping_ratio
 
 
 def _random_cell(measured: BeamRun, simulated: BeamRun | None) -> str:
-    was, now = _fitted(measured), _fitted(simulated)
+    was, now = fitted_damping(measured), fitted_damping(simulated)
     return MISSING if was is None or now is None else f"{text(100 * now)} ({signed(100 * (now / was - 1), 2)} %)"

@@ -38,7 +38,9 @@ TWINS: Final[Mapping[str, Mapping[str, str]]] = {
 _TWIN_TABLES: Final = re.compile(r"^\[twin(\.[^\]]*)?\].*?(?=^\[(?!twin)|\Z)", re.MULTILINE | re.DOTALL)
 
 
-def twins_of_runs(runs: Sequence[Path], rig: Path, output: Path, more: Mapping[str, str]) -> list[Path]:
+def twins_of_runs(
+    runs: Sequence[Path], rig: Path, output: Path, more: Mapping[str, str], *, with_known: bool = True
+) -> list[Path]:
     """Simulate sloshing recordings with the twins of their experiment, and with more.
 
     Parameters
@@ -51,6 +53,8 @@ def twins_of_runs(runs: Sequence[Path], rig: Path, output: Path, more: Mapping[s
         Folder for the rig files of the twins and the simulated recordings.
     more : mapping of str to str
         Tables [twin] by name, beside or instead of those of `TWINS`.
+    with_known : bool
+        Whether those of `TWINS` are simulated, too.
 
     Returns
     -------
@@ -64,7 +68,7 @@ def twins_of_runs(runs: Sequence[Path], rig: Path, output: Path, more: Mapping[s
         known = TWINS.get(attributes.experiment)
         is_measured = not (attributes.model_extra or {}).get("simulated_from")
         if attributes.configuration == "sloshing" and known is not None and is_measured:
-            planned += [(path, name, table) for name, table in {**known, **more}.items()]
+            planned += [(path, name, table) for name, table in {**(known if with_known else {}), **more}.items()]
     made = []
     with progress("twins", len(planned)) as advance:
         for path, name, table in planned:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 from pipelines.inputs.recordings import RunSource
 from pipelines.inputs.rigs import RigSource
 from pipelines.structure.analysis import analyse_beam
+from pipelines.structure.network_uncertainty import network_uncertainty
 from pipelines.structure.results import BeamExperiment, BeamSettings
 from pipelines.structure.twins import tank_models, twins_of_runs
 from sloshlab.errors import InputError
@@ -21,6 +23,7 @@ def analyse_beam_with_twins(
     *,
     roms: Sequence[Path] = (),
     balls: Sequence[Path] = (),
+    ensemble: Path | None = None,
 ) -> tuple[BeamExperiment, dict[str, bytes]]:
     """Simulate the sloshing runs with frozen liquid, dampers and more, and analyse everything together.
 
@@ -33,6 +36,8 @@ def analyse_beam_with_twins(
     settings : BeamSettings
     roms, balls : sequence of Path
         Models of `sloshlab train` and files of `sloshlab ball` to simulate the runs with, too.
+    ensemble : Path, optional
+        Of `sloshlab train --ensemble`: its members are simulated, too, and only their ζ₁ is kept.
 
     Returns
     -------
@@ -59,4 +64,9 @@ def analyse_beam_with_twins(
         models = tank_models(roms, balls, folder)
         made = twins_of_runs(files, rig, folder, models)
         experiment = analyse_beam([*made, *files], rig, settings)
+        if ensemble is not None:
+            uncertain = network_uncertainty(ensemble, files, rig, settings)
+            experiment = dataclasses.replace(
+                experiment, network_uncertainty=uncertain, inputs=(*experiment.inputs, ensemble)
+            )
         return experiment, {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
