@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from sloshlab.errors import InputError
 from sloshlab.toml_file import parse_toml, read_toml_text
@@ -53,6 +54,8 @@ class DescribedFlap:
     hinge : float
         Behind mid-chord, in semi-chords.
     actuator_frequency_hz, actuator_damping_ratio : float
+    linkage_time_s : float
+        With which the flap follows the actuator; 0 for a rigid linkage.
     """
 
     inner_m: float
@@ -60,6 +63,7 @@ class DescribedFlap:
     hinge: float
     actuator_frequency_hz: float
     actuator_damping_ratio: float
+    linkage_time_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -133,3 +137,18 @@ def _described(document: dict[str, Any], text: str) -> DescribedWing:
     )
     flap = DescribedFlap(**{name: float(value) for name, value in document["flap"].items()})
     return DescribedWing(**numbers, flap=flap, tanks=tanks, accelerometers=sensors, text=text)
+
+
+_TIMES: Final = {"length_m": 0.3, "height_m": 0.5, "width_m": 1 / 0.15}
+_DIMENSION: Final = re.compile(r"^([ \t]*(length_m|height_m|width_m)[ \t]*=[ \t]*)([-+0-9.eE]+)", re.MULTILINE)
+
+
+def with_spanwise_tanks(wing: DescribedWing) -> DescribedWing:
+    """The wing with slender tanks along the span: as heavy, and with a tenth of the inertia in pitch.
+
+    Parameters
+    ----------
+    wing : DescribedWing
+    """
+    text = _DIMENSION.sub(lambda found: f"{found[1]}{_TIMES[found[2]] * float(found[3]):.9g}", wing.text)
+    return _described(parse_toml(text, "model"), text)

@@ -1,4 +1,4 @@
-"""From the command to the flap: delay, actuator of the second order with limits, play of the hinge."""
+"""From the command to the flap: delay, actuator of the second order with limits, linkage with play."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def flap_motion(
     actuator = _followed(
         late, omega, wing.flap.actuator_damping_ratio, hidden.flap_limit_rad, hidden.flap_rate_rad_per_s, rate_hz
     )
-    return actuator, _behind_play(actuator, hidden.play_rad)
+    return actuator, _behind_linkage(actuator, hidden.play_rad, wing.flap.linkage_time_s * rate_hz)
 
 
 @njit(cache=True)
@@ -55,11 +55,21 @@ def _followed(command, omega, damping_ratio, limit, rate_limit, rate_hz):  # typ
 
 
 @njit(cache=True)
-def _behind_play(angle, play):  # type: ignore[no-untyped-def]
-    """What follows with a play: it rests until it is pushed."""
+def _behind_linkage(angle, play, time_in_samples):  # type: ignore[no-untyped-def]
+    """What follows with a play: it rests until it is pushed.
+
+    The linkage is a spring against the damping of the flap in the air, τβ̇ = what it is stretched beyond the play,
+    in steps far shorter than a sample; a rigid one, τ = 0, pushes at once.
+    """
     followed = np.empty(angle.size)
+    n_steps = 8
+    share = 1.0 - np.exp(-1.0 / (n_steps * time_in_samples)) if time_in_samples > 0.0 else 1.0
     x = angle[0]
     for i in range(angle.size):
-        x = min(max(x, angle[i] - 0.5 * play), angle[i] + 0.5 * play)
+        for k in range(n_steps):
+            # the actuator at the middle of a step, linear between its samples
+            at = (k + 0.5) / n_steps if time_in_samples > 0.0 else 1.0
+            pushed = angle[max(i - 1, 0)] * (1.0 - at) + angle[i] * at
+            x += share * (min(max(x, pushed - 0.5 * play), pushed + 0.5 * play) - x)
         followed[i] = x
     return followed

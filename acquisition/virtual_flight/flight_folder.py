@@ -14,21 +14,20 @@ from acquisition.virtual_flight.recorded_flight import perfect_run, write_run
 from sloshlab import atomic_file
 
 
-def write_flight(folder: Path, wing: DescribedWing, flight: Flight) -> None:
+def write_flight(folder: Path, flight: Flight) -> None:
     """Write one case: the model file as believed, and its recordings.
 
     Parameters
     ----------
     folder : Path
-    wing : DescribedWing
     flight : Flight
     """
     (folder / "recordings").mkdir(parents=True)
-    (folder / "model.toml").write_text(wing.text, "utf-8")
+    (folder / "model.toml").write_text(flight.wing.text, "utf-8")
     for number, point in enumerate(flight.card, start=1):
         # repeats of a test share what is done, and nothing else
         readings = perfect_run(
-            wing, flight.hidden, flight.laboratory, point, [*flight.seed, 0, number - (point.repeat - 1)]
+            flight.wing, flight.hidden, flight.laboratory, point, [*flight.seed, 0, number - (point.repeat - 1)]
         )
         noise = np.random.default_rng([*flight.seed, 1, number])
         write_run(folder / "recordings" / f"run_{number:02d}.nc", readings, point, number, noise)
@@ -60,7 +59,7 @@ def write_challenge(
     flights = FlightDrawing(wing, seed).flights(n_cases, said)
     with atomic_file.filled_folder(folder) as complete:
         for flight in flights:
-            write_flight(complete / "cases" / flight.name, wing, flight)
+            write_flight(complete / "cases" / flight.name, flight)
     if truths is not None:
         content = json.dumps({flight.name: flight.truth for flight in flights}, indent=1, sort_keys=True)
         atomic_file.write_bytes(truths, content.encode() + b"\n")

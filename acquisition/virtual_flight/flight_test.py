@@ -39,16 +39,14 @@ class FlightPoint:
 
 CARD: Final = (
     FlightPoint("gust", 14.0, 1.2),
-    FlightPoint("gust", 20.0, 1.3),
     FlightPoint("gust", 20.0, 2.6),
     FlightPoint("pulse", 14.0, 0.15),
-    FlightPoint("pulse", 20.0, 0.15),
     FlightPoint("pulse", 20.0, 0.30),
     FlightPoint("pulse", 20.0, 0.30, 2),
     FlightPoint("taxi", 0.0, 5.0),
 )
-"""Two speeds, two levels at one of them, one repeat, and a run without air."""
-DURATION_S: Final = 4.5
+"""Two speeds, at each a level of its own, one repeat, and a run without air."""
+DURATION_S: Final = 3.4
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,9 +82,9 @@ def signals_of(point: FlightPoint, generator: np.random.Generator) -> Signals:
 
 
 def _gusts(time: FloatArray, point: FlightPoint, generator: np.random.Generator) -> FloatArray:
-    """1 − cos gusts, three in a run, 2 to 6 m long, up and down."""
+    """1 − cos gusts, two in a run, 2 to 6 m long, up and down."""
     gust = np.zeros(time.size)
-    for k, size in enumerate(generator.permutation([1.0, 0.75, 0.9])):
+    for k, size in enumerate(generator.permutation([1.0, 0.75])):
         duration = generator.uniform(2.0, 6.0) / point.airspeed_m_per_s
         start = 0.25 + 1.3 * k + generator.uniform(0.0, 0.4)
         inside = (time >= start) & (time <= start + duration)
@@ -102,7 +100,7 @@ def _pulses(time: FloatArray, level: float, generator: np.random.Generator) -> F
     command = np.zeros(time.size)
     for k, size in enumerate(generator.permutation([1.0, 0.7])):
         half = generator.uniform(0.10, 0.25)
-        start = 0.25 + 1.9 * k + generator.uniform(0.0, 0.4)
+        start = 0.25 + 1.5 * k + generator.uniform(0.0, 0.4)
         sign = generator.choice([-1.0, 1.0])
         up = _ramp(time - start)
         down, back = _ramp(time - start - half), _ramp(time - start - 2 * half)
@@ -118,7 +116,7 @@ def _ramp(time: FloatArray) -> FloatArray:
 def _bumps(time: FloatArray, level: float, generator: np.random.Generator) -> FloatArray:
     """Bumps of a runway: two periods each under a smooth window, whose mean is none."""
     root = np.zeros(time.size)
-    for k, size in enumerate(generator.permutation([1.0, 0.7, 0.85])):
+    for k, size in enumerate(generator.permutation([1.0, 0.7])):
         frequency = generator.uniform(2.5, 8.0)
         start = 0.2 + 1.35 * k + generator.uniform(0.0, 0.4)
         phase = (time - start) * frequency

@@ -52,9 +52,9 @@ def make_flight(model: Path | None, output: Path, *, seed: int, hide: str) -> di
     wing = read_wing(_required(model))
     hidden = hidden_of(hide, len(wing.tanks))
     laboratory = drawn_laboratory(wing, np.random.default_rng([seed, 10]))
-    flight = Flight(output.name, hidden, laboratory, CARD, {}, [seed, 20])
+    flight = Flight(output.name, wing, hidden, laboratory, CARD, {}, [seed, 20])
     with atomic_file.filled_folder(output) as complete:
-        write_flight(complete, wing, flight)
+        write_flight(complete, flight)
     lines = [
         f"{len(CARD)} recordings in {output / 'recordings'}",
         f"hidden: {hide or 'nothing'}",

@@ -83,6 +83,8 @@ class FlapTable(_Table):
         Behind mid-chord, in semi-chords.
     actuator_frequency_hz, actuator_damping_ratio : float
         Of the second order between command and angle.
+    linkage_time_s : float
+        With which the flap follows the actuator, as a spring against the damping of the air; 0 if it is rigid.
     """
 
     inner_m: Annotated[_Number, Field(ge=0)]
@@ -90,6 +92,7 @@ class FlapTable(_Table):
     hinge: _Share
     actuator_frequency_hz: _Positive
     actuator_damping_ratio: Annotated[_Positive, Field(lt=2)]
+    linkage_time_s: Annotated[_Number, Field(ge=0, lt=1)] = 0.0
 
 
 class TankTable(_Table):

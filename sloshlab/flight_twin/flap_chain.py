@@ -1,4 +1,4 @@
-"""From the command of the flap to its angle: a delay, an actuator of the second order with limits, a play."""
+"""From the command of the flap to its angle: a delay, an actuator of the second order, a linkage with play."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def flap_angles(
     drive = np.array([0.0, omega**2])
     wanted = np.clip(late, -limit, limit)
     angle = _followed(phi, gamma0 @ drive, gamma1 @ drive, wanted, rate_limit, step_s)
-    return angle, _behind_play(angle, numbers["play_rad"])
+    return angle, _behind_linkage(angle, numbers["play_rad"], flap.linkage_time_s / step_s)
 
 
 @njit(cache=True)
@@ -59,13 +59,29 @@ def _followed(phi, before, after, wanted, rate_limit, step):  # type: ignore[no-
 
 
 @njit(cache=True)
-def _behind_play(angle, play):  # type: ignore[no-untyped-def]
-    """It rests until it is pushed from one side or the other."""
-    if play == 0.0:
+def _behind_linkage(angle, play, steps):  # type: ignore[no-untyped-def]
+    """It rests until it is pushed from one side or the other.
+
+    τβ̇ = stretch of the linkage beyond its play, `steps` of time long: exact for an actuator that is linear within
+    a step and a linkage that is stretched, or loose, all the while.
+    """
+    if play == 0.0 and steps == 0.0:
         return angle
     behind = np.zeros(angle.size)
+    decay = np.exp(-1.0 / steps) if steps > 0.0 else 0.0
+    late = steps * (1.0 - decay)
     x = 0.0
-    for i in range(angle.size):
-        x = min(max(x, angle[i] - 0.5 * play), angle[i] + 0.5 * play)
+    for i in range(1, angle.size):
+        # from where it rests the end of the step decides on which side it is pushed
+        side = 1.0 if angle[i] - x > 0.5 * play else (-1.0 if angle[i] - x < -0.5 * play else 0.0)
+        if side != 0.0:
+            before, now = angle[i - 1] - 0.5 * side * play, angle[i] - 0.5 * side * play
+            if (before - x) * side < 0.0:
+                # still loose at its beginning: pushed from where the stretch is none
+                share = (now - x) / (now - before)
+                begun = np.exp(-share / steps) if steps > 0.0 else 0.0
+                x = now - (now - x) / share * steps * (1.0 - begun)
+            else:
+                x = decay * x + (1.0 - late) * now + (late - decay) * before
         behind[i] = x
     return behind

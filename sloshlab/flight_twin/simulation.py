@@ -18,7 +18,7 @@ from sloshlab.flight_twin.flap_chain import flap_angles
 from sloshlab.flight_twin.modal_wing import ModalWing, modal_wing
 from sloshlab.flight_twin.numbers import BELIEVED, of_tank
 from sloshlab.flight_twin.state_space import StateSpace, numbers_with, state_space
-from sloshlab.flight_twin.stepping import Nonlinear, Transition, stepped, transition
+from sloshlab.flight_twin.stepping import Inputs, Nonlinear, Transition, inputs_of, stepped, transition
 from sloshlab.user_twin.description import Response, TwinRun
 
 FloatArray = npt.NDArray[np.float64]
@@ -55,6 +55,7 @@ class FlightSimulation:
         self.modal: ModalWing = modal_wing(described)
         self._liquid_kg = [tank.box().liquid_mass_kg for tank in described.tanks]
         self._drives = Kept[FloatArray](_MOST_KEPT)
+        self._acting = Kept[tuple[Inputs, FloatArray]](_MOST_KEPT)
         self._equations = Kept[tuple[StateSpace, Transition]](_MOST_KEPT)
         self._responses = Kept[Response](_MOST_RESPONSES)
 
@@ -74,10 +75,16 @@ class FlightSimulation:
 
     def _simulated(self, run: TwinRun, numbers: Mapping[str, float]) -> Response:
         nonlinear = self._nonlinear(numbers, run.sampling_rate_hz)
-        inputs, actuator, every = self._inputs(run, numbers, nonlinear)
+        # where a play is taken up the flap begins to move within a step
+        is_smooth = nonlinear.is_none and not (numbers["play_rad"] > 0 and run.channels[COMMAND].any())
+        every = _LINEAR_SUBSTEPS if is_smooth else _SUBSTEPS
+        of_inputs = tuple(numbers[name] for name in _OF_INPUTS)
+        inputs, actuator = self._acting.of(
+            (id(run), every, of_inputs), lambda: self._inputs(run, numbers, every), run
+        )
         equations, through = self._solved(run, numbers, 1.0 / (every * run.sampling_rate_hz))
-        states, moved = stepped(equations, through, inputs, nonlinear, every)
-        n, root, tip = equations.n_coordinates, inputs[::every, 3], equations.tip_row
+        states, moved = stepped(equations, through, inputs, nonlinear)
+        n, root, tip = equations.n_coordinates, inputs.at_steps[::every, 3], equations.tip_row
         readings = {each.name: moved[:, k] + root for k, each in enumerate(self.described.accelerometers)}
         readings[FLAP] = self.described.flap_chord_m * actuator
         motion = np.stack([states[:, :n] @ tip, states[:, n : 2 * n] @ tip, moved[:, -1]], axis=-1)
@@ -128,11 +135,8 @@ class FlightSimulation:
             1.0 / (_SUBSTEPS * rate_hz),
         )
 
-    def _inputs(
-        self, run: TwinRun, numbers: Mapping[str, float], nonlinear: Nonlinear
-    ) -> tuple[FloatArray, FloatArray, int]:
-        """Inputs at every step, angle of the actuator at every sample, steps per sample."""
-        every = _LINEAR_SUBSTEPS if nonlinear.is_none else _SUBSTEPS
+    def _inputs(self, run: TwinRun, numbers: Mapping[str, float], every: int) -> tuple[Inputs, FloatArray]:
+        """Inputs at every step, some a sample, and the angle of the actuator at every sample."""
         fine = self._fine(run)[:: _FLAP_SUBSTEPS // every]
         step = 1.0 / (every * run.sampling_rate_hz)
         gust = _later(fine[:, 0], numbers["gust_delay_s"] / step)
@@ -148,7 +152,7 @@ class FlightSimulation:
         # of the steps that are made: where a limit or a play stops the flap no part of its way is lost
         rate = np.gradient(flap) / step if flap.any() else flap
         inputs = np.stack([gust, flap, rate, fine[:, 2]], axis=-1)
-        return np.ascontiguousarray(inputs), actuator[::_FLAP_SUBSTEPS], every
+        return inputs_of(inputs, every), actuator[::_FLAP_SUBSTEPS]
 
     def _fine(self, run: TwinRun) -> FloatArray:
         """Gust, command [rad] and root at `_FLAP_SUBSTEPS` per sample; kept, as a fit asks for them again."""
@@ -183,6 +187,7 @@ _OF_CONTROL: Final = frozenset(
     {"flap_limit_rad", "flap_rate_rad_per_s", "actuator_delay_s", "play_rad", "actuator frequency"}
 )
 _OF_GUSTS: Final = frozenset({"gust_delay_s", "gust_time_constant_s"})
+_OF_INPUTS: Final = tuple(sorted(_OF_CONTROL | _OF_GUSTS))
 _OF_SPEED: Final = frozenset({"airspeed_error", "lag_ratio", "stall_angle_rad"})
 _NOT_LINEAR: Final = _OF_CONTROL | _OF_GUSTS | {"clearance_m", "clearance_n_per_m"}
 """Numbers that do not enter the linear equations."""

@@ -110,35 +110,74 @@ def _exponentials(a):  # type: ignore[no-untyped-def]
     return phi * back, phi1 * back, phi2 * back
 
 
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """What drives a run.
+
+    Attributes
+    ----------
+    at_steps : ndarray, shape (n_steps, 4)
+        Linear between steps.
+    of_samples : ndarray, shape (n_samples − 1, (every + 1) · n_moving)
+        Those that are not zero throughout, at all steps of a sample and at its end.
+    moving : ndarray of int, shape (n_moving,)
+        Which these are.
+    every : int
+        Steps in a sample.
+    """
+
+    at_steps: FloatArray
+    of_samples: FloatArray
+    moving: npt.NDArray[np.intp]
+    every: int
+
+
+def inputs_of(at_steps: FloatArray, every: int) -> Inputs:
+    """Arrange inputs for `stepped`.
+
+    Parameters
+    ----------
+    at_steps : ndarray, shape (n_steps, 4)
+    every : int
+        Steps in a sample; ends with one.
+    """
+    moving = np.flatnonzero(at_steps.any(axis=0))
+    given = at_steps[:, moving]
+    n = (given.shape[0] - 1) // every
+    within = [given[k : k + (n - 1) * every + 1 : every] for k in range(every + 1)]
+    return Inputs(np.ascontiguousarray(at_steps), np.concatenate(within, axis=1), moving, every)
+
+
 def stepped(
-    equations: StateSpace, through: Transition, inputs: FloatArray, nonlinear: Nonlinear, every: int
+    equations: StateSpace, through: Transition, inputs: Inputs, nonlinear: Nonlinear
 ) -> tuple[FloatArray, FloatArray]:
-    """States from rest at every so many steps, and accelerations at the sensors and the tip relative to the root.
+    """States from rest at every sample, and accelerations at the sensors and the tip relative to the root.
 
     Parameters
     ----------
     equations : StateSpace
     through : Transition
         Of its system over a step.
-    inputs : ndarray, shape (n_steps, 4)
+    inputs : Inputs
     nonlinear : Nonlinear
-    every : int
 
     Returns
     -------
     states : ndarray, shape (n_samples, n_states)
     accelerations : ndarray, shape (n_samples, n_sensors + 1)
     """
-    n, (phi, gamma0, gamma1) = equations.n_coordinates, through
+    n, every, (phi, gamma0, gamma1) = equations.n_coordinates, inputs.every, through
     rows = np.vstack([equations.sensor_rows, equations.tip_row])
-    moving = np.flatnonzero(inputs.any(axis=0))
-    given, columns = np.ascontiguousarray(inputs[:, moving]), equations.inputs[:, moving]
-    driven = given[:-1] @ (gamma0 @ columns).T + given[1:] @ (gamma1 @ columns).T
-    sampled = given[::every] @ (rows @ columns[n : 2 * n]).T
+    columns = equations.inputs[:, inputs.moving]
     of_states = (rows @ equations.system[n : 2 * n]).T
+    sampled = inputs.at_steps[::every, inputs.moving] @ (rows @ columns[n : 2 * n]).T
+    before, after = gamma0 @ columns, gamma1 @ columns
     if nonlinear.is_none:
-        states = _linear(np.linalg.matrix_power(phi, every), _at_samples(phi, driven, every))
+        of_sample, over = _of_a_sample(phi, before, after, every)
+        states = _linear(over, inputs.of_samples @ of_sample.T)
         return states, states @ of_states + sampled
+    given = inputs.at_steps[:, inputs.moving]
+    driven = given[:-1] @ before.T + given[1:] @ after.T
     numbers = np.array(
         [
             nonlinear.stall_angle_rad,
@@ -152,12 +191,12 @@ def stepped(
     of_rates = equations.tank_rows
     accelerations = (
         np.ascontiguousarray(of_rates @ equations.system[n : 2 * n]),
-        inputs @ (of_rates @ equations.inputs[n : 2 * n]).T + inputs[:, 3:],
+        inputs.at_steps @ (of_rates @ equations.inputs[n : 2 * n]).T + inputs.at_steps[:, 3:],
         np.ascontiguousarray(of_rates @ equations.forces[n : 2 * n]),
     )
     states, forces = _with_forces(
         phi, driven, gamma0 @ equations.forces, gamma1 @ equations.forces,
-        *accelerations, inputs, equations.angle_rows, equations.angle_inputs, equations.lift_rows,
+        *accelerations, inputs.at_steps, equations.angle_rows, equations.angle_inputs, equations.lift_rows,
         equations.tank_rows, equations.tip_row, nonlinear.sloshing, nonlinear.loss_kg_per_s, numbers,
         nonlinear.step_s,
     )  # fmt: skip
@@ -165,12 +204,19 @@ def stepped(
     return states, states @ of_states + sampled + forces @ (rows @ equations.forces[n : 2 * n]).T
 
 
-def _at_samples(phi: FloatArray, driven: FloatArray, every: int) -> FloatArray:
-    """What all steps of a sample drive together: Σ Φᵏ d."""
-    total = driven[::every].copy()
-    for step in range(1, every):
-        total = total @ phi.T + driven[step::every]
-    return total
+def _of_a_sample(
+    phi: FloatArray, before: FloatArray, after: FloatArray, every: int
+) -> tuple[FloatArray, FloatArray]:
+    """What the inputs at all steps of a sample and at its end make of it together, and Φ over the sample."""
+    parts = [np.zeros_like(before)]
+    over = np.eye(phi.shape[0])
+    for _ in range(every):
+        # all that came before goes through one step more
+        parts = [phi @ part for part in parts]
+        parts[-1] = parts[-1] + before
+        parts.append(after)
+        over = phi @ over
+    return np.concatenate(parts, axis=1), over
 
 
 @njit(cache=True, fastmath=True)

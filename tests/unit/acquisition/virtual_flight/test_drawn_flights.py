@@ -8,9 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.virtual_flight.described_wing import read_wing
-from acquisition.virtual_flight.drawn_flights import SINGLES, FlightDrawing, _in_proportion
+from acquisition.virtual_flight.described_wing import read_wing, with_spanwise_tanks
+from acquisition.virtual_flight.drawn_effects import SINGLES
+from acquisition.virtual_flight.drawn_flights import FlightDrawing, _in_proportion
+from acquisition.virtual_flight.flight_test import CARD
 from acquisition.virtual_flight.hidden_physics import HiddenFlight
+from acquisition.virtual_flight.recorded_flight import Laboratory
+from acquisition.virtual_flight.shown_change import ShownChange
 from pipelines.diagnosis.challenge_truths import known_vocabulary, marked_truth
 from sealed_trial.challenge.stated_truth import stated_truth
 
@@ -43,11 +47,50 @@ def test_the_same_seed_draws_the_same_and_another_another(drawing: FlightDrawing
     assert FlightDrawing(WING, 4).flights(2)[1].laboratory != first.laboratory
 
 
-def test_what_retuning_takes_is_no_strength(drawing: FlightDrawing) -> None:
+@pytest.fixture(scope="module")
+def shown() -> ShownChange:
+    return ShownChange(WING, Laboratory(), CARD, [5])
+
+
+def test_what_retuning_takes_is_no_strength(shown: ShownChange) -> None:
     """A loss factor of 0.004 is damping off by a tenth, a gain of a hundredth is the tolerance of a sensor."""
-    assert drawing.strength(HiddenFlight(loss_factor=0.004)) < 0.2
-    assert drawing.strength(HiddenFlight(sensor=(("acceleration_tank_1", "gain", 0.01),))) < 1e-6
-    assert drawing.strength(HiddenFlight(sensor=(("acceleration_tank_1", "gain", 0.1),))) > 1.0
+    assert shown.strength(HiddenFlight(loss_factor=0.004)) < 0.2
+    assert shown.strength(HiddenFlight(sensor=(("acceleration_tank_1", "gain", 0.01),))) < 1e-6
+    assert shown.strength(HiddenFlight(sensor=(("acceleration_tank_1", "gain", 0.1),))) > 1.0
+
+
+def test_retuning_goes_no_further_than_from_the_belief() -> None:
+    """A gain that the laboratory has spent already is no more to be had."""
+    fault = HiddenFlight(sensor=(("acceleration_tip_rear", "gain", 0.012),))
+    spent = ShownChange(WING, Laboratory({"acceleration_tip_rear": 1.0125}), CARD[:1], [5])
+    assert ShownChange(WING, Laboratory(), CARD[:1], [5]).strength(fault) < 1e-6 < 0.1 < spent.strength(fault)
+
+
+def test_a_large_retuning_is_found(shown: ShownChange) -> None:
+    """A wing a tenth stiffer: linear about the belief it would show far beyond."""
+    assert ShownChange(WING, Laboratory({"bending": 0.92}), CARD, [5])._left(shown._plain.runs).std() < 0.05
+
+
+def test_a_liquid_shows_its_inertia_in_pitch_but_in_slender_tanks(shown: ShownChange) -> None:
+    def heavier(change: float) -> HiddenFlight:
+        return HiddenFlight(effective_mass={1: 0.2 * (1 + change)})
+
+    fuller = HiddenFlight(fill_levels={1: 1.2 * WING.tanks[1].fill_level})
+    slender = with_spanwise_tanks(WING)
+    for one, other in zip(slender.tanks, WING.tanks, strict=True):
+        assert one.liquid_kg() == pytest.approx(other.liquid_kg())
+        assert one.pitch_inertia_kg_m2() < 0.11 * other.pitch_inertia_kg_m2()
+    apart = ShownChange(slender, Laboratory(), CARD, [5]).told_apart(fuller, heavier)
+    assert 20 * apart < shown.told_apart(fuller, heavier)
+    # itself is found exactly where the change is small enough to be linear
+    assert shown.told_apart(heavier(0.001), heavier) < 1e-3
+
+
+def test_look_alikes_are_of_slender_tanks(drawing: FlightDrawing) -> None:
+    of_class = {flight.truth["hidden"]: flight for flight in drawing.flights(10)}
+    flight = of_class["look_alikes"]
+    assert flight.wing.tanks[0].width_m > 0.5 > of_class["effects"].wing.tanks[0].width_m
+    assert {flight.truth["effects"][0]["name"], *flight.truth["equals"][0]} == {"effective_mass", "fuel_state"}
 
 
 def test_every_single_effect_is_of_the_vocabulary() -> None:

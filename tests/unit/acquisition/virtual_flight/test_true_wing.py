@@ -98,7 +98,25 @@ def test_the_actuator_follows_as_its_transfer_says(bare: DescribedWing) -> None:
     late = time > 4
     expected = 0.1 * np.imag(transfer * np.exp(2j * pi * frequency * time))
     np.testing.assert_allclose(angle[late], expected[late], atol=1e-4)
-    np.testing.assert_array_equal(angle, behind)
+    stiff = dataclasses.replace(bare, flap=dataclasses.replace(bare.flap, linkage_time_s=0.0))
+    angle, behind = flap_motion(stiff, HiddenFlight(), 0.1 * np.sin(2 * pi * frequency * time), rate, 1.0)
+    np.testing.assert_allclose(angle, behind, rtol=1e-12)
+
+
+def test_the_linkage_is_a_lag_of_the_first_order(bare: DescribedWing) -> None:
+    """1/(1 + iωτ), and half the play behind what turns steadily, both in front of and behind the lag."""
+    rate, frequency, lag_s = 2048.0, 4.0, 0.008
+    time = np.arange(int(6 * rate)) / rate
+    soft = dataclasses.replace(bare, flap=dataclasses.replace(bare.flap, linkage_time_s=lag_s))
+    angle, behind = flap_motion(soft, HiddenFlight(), 0.1 * np.sin(2 * pi * frequency * time), rate, 1.0)
+    ratio = frequency / bare.flap.actuator_frequency_hz
+    transfer = 1 / (1 - ratio**2 + 2j * bare.flap.actuator_damping_ratio * ratio)
+    transfer /= 1 + 2j * pi * frequency * lag_s
+    late = time > 4
+    expected = 0.1 * np.imag(transfer * np.exp(2j * pi * frequency * time))
+    np.testing.assert_allclose(behind[late], expected[late], atol=1e-4)
+    angle, behind = flap_motion(soft, HiddenFlight(play_rad=0.04), 0.1 * time, rate, 1.0)
+    assert (angle - behind)[-1] == pytest.approx(0.02 + 0.1 * lag_s, rel=1e-3)
 
 
 def test_limits_and_play_of_the_flap(bare: DescribedWing) -> None:
@@ -113,7 +131,8 @@ def test_limits_and_play_of_the_flap(bare: DescribedWing) -> None:
     assert limited.max() == pytest.approx(0.1 * (1 + np.exp(-pi * ratio / sqrt(1 - ratio**2))), rel=1e-3)
     slow, _ = flap_motion(bare, HiddenFlight(flap_rate_rad_per_s=0.5), command, rate, 1.0)
     assert np.abs(np.gradient(slow) * rate).max() == pytest.approx(0.5, rel=1e-3)
-    angle, behind = flap_motion(bare, HiddenFlight(play_rad=0.04), command, rate, 1.0)
+    stiff = dataclasses.replace(bare, flap=dataclasses.replace(bare.flap, linkage_time_s=0.0))
+    angle, behind = flap_motion(stiff, HiddenFlight(play_rad=0.04), command, rate, 1.0)
     # it follows half the play behind, in both directions
     rising = np.gradient(angle) > 1e-4
     assert np.median((angle - behind)[rising & (time > 1)]) == pytest.approx(0.02, rel=1e-3)
