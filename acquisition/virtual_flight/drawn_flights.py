@@ -19,6 +19,7 @@ from acquisition.virtual_flight.flight_test import CARD, FlightPoint
 from acquisition.virtual_flight.hidden_physics import HiddenFlight
 from acquisition.virtual_flight.recorded_flight import Laboratory, drawn_laboratory
 from acquisition.virtual_flight.shown_change import ShownChange
+from sloshlab.errors import AnalysisError
 
 Generator = np.random.Generator
 _SHARES: Final = {"nothing": 15, "effects": 33, "look_alikes": 6, "outside": 6}
@@ -37,6 +38,7 @@ _TOLD_APART: Final = 12.0
 _ALIKE: Final = 3.0
 """The same of look-alikes, at most: twenty to one."""
 _MOST_TRIES: Final = 6
+_MOST_ATTEMPTS: Final = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,28 +104,32 @@ class FlightDrawing:
         return found
 
     def _flight(self, number: int, kind: str, draws: Sequence[Draw]) -> Flight:
-        """A flight with the first of some effects that can be drawn there as its class asks."""
-        generator = np.random.default_rng([self._seed, 10, number])
+        """A flight with the first of some effects that can be drawn there as its class asks; another one if none."""
+        for attempt in range(_MOST_ATTEMPTS):
+            own = [self._seed, number, attempt]
+            flight = self._empty(f"case_{number + 1:03d}", kind, own)
+            if not draws:
+                return flight
+            shown = ShownChange(flight.wing, flight.laboratory, flight.card, [*flight.seed, 0])
+            least, most = _LOOK_ALIKE if kind == "look_alikes" else (_WEAKEST, _STRONGEST)
+            wanted = np.random.default_rng([*own, 11]).uniform(np.log(least), np.log(most))
+            # what is told apart where it is strong may be alike where it is weak
+            for strength in np.unique(np.maximum(np.exp(wanted) * 0.8 ** np.arange(4), least))[::-1]:
+                for draw in draws:
+                    drawing = _OfOneCase(draw, flight.wing, [*own, 12])
+                    drawn = self._with_effect(flight, drawing, shown, float(strength))
+                    if drawn is not None:
+                        return drawn
+        raise AnalysisError(f"flight {number + 1}", got="no effect that shows as its class asks", allowed="one")
+
+    def _empty(self, name: str, kind: str, own: list[int]) -> Flight:
+        """A flight that hides nothing."""
+        generator = np.random.default_rng([*own, 10])
         wing = with_spanwise_tanks(self._wing) if kind == "look_alikes" else self._wing
         laboratory = drawn_laboratory(wing, generator)
         speeds = {14.0: float(generator.uniform(13.0, 15.0)), 20.0: float(generator.uniform(18.5, 20.5)), 0.0: 0.0}
         card = tuple(replace(point, airspeed_m_per_s=speeds[point.airspeed_m_per_s]) for point in CARD)
-        seed = [self._seed, 20, number]
-        flight = Flight(f"case_{number + 1:03d}", wing, HiddenFlight(), laboratory, card, {"hidden": kind}, seed)
-        if not draws:
-            return flight
-        shown = ShownChange(wing, laboratory, card, [*seed, 0])
-        least, most = _LOOK_ALIKE if kind == "look_alikes" else (_WEAKEST, _STRONGEST)
-        wanted = np.random.default_rng([self._seed, 11, number]).uniform(np.log(least), np.log(most))
-        # what is told apart where it is strong may be alike where it is weak
-        for strength in np.unique(np.maximum(np.exp(wanted) * 0.8 ** np.arange(4), least))[::-1]:
-            for draw in draws:
-                drawn = self._with_effect(
-                    flight, _OfOneCase(draw, wing, [self._seed, 12, number]), shown, strength
-                )
-                if drawn is not None:
-                    return drawn
-        raise AssertionError(f"no effect shows in {flight.name}")
+        return Flight(name, wing, HiddenFlight(), laboratory, card, {"hidden": kind}, [*own, 20])
 
     @staticmethod
     def _with_effect(flight: Flight, drawing: _OfOneCase, shown: ShownChange, wanted: float) -> Flight | None:

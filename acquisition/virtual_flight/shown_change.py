@@ -31,7 +31,7 @@ _STEP: Final = 0.002
 """Of a factor, for differences; a damping shows less."""
 _LINEAR: Final = 0.004
 """Change of a stiffness up to which retuning is linear: a fifth of a per cent of a frequency."""
-_MOST_LINEARISED: Final = 3
+_MOST_LINEARISED: Final = 4
 OTHER_STEP: Final = 0.02
 """Relative change of the number of another effect, likewise."""
 

@@ -15,7 +15,7 @@ from sloshlab.aircraft.landing import fuselage_acceleration_m_per_s2, fuselage_v
 from sloshlab.aircraft.linear_flight import LinearFlight, linear_flight
 from sloshlab.aircraft.linear_sloshing import with_dampers
 from sloshlab.aircraft.model import AircraftModel
-from sloshlab.aircraft.response_readings import damping_between_peaks, limit_cycle_of
+from sloshlab.aircraft.oscillation_measures import damping_between_peaks, limit_cycle_of
 from sloshlab.aircraft.tank_simulation import simulate_flight
 from sloshlab.aircraft.vertical_sloshing import LARGEST_ACCELERATION_G
 from sloshlab.aircraft.wing_air import WingAir

@@ -16,7 +16,7 @@ from pipelines.flutter.analysis import Stability
 from sloshlab.aeroelastic.generalised_force_cache import CacheStatus
 from sloshlab.aeroelastic.root_locus import Crossing
 from sloshlab.aircraft.limit_cycle import BranchPoint
-from sloshlab.aircraft.response_readings import LimitCycle, PeakDamping
+from sloshlab.aircraft.oscillation_measures import LimitCycle, PeakDamping
 from sloshlab.aircraft.vertical_sloshing import LARGEST_ACCELERATION_G, TankDeparture
 from sloshlab.aircraft.wing_calibration import WingState
 from sloshlab.aircraft.wing_energy import EnergyMap

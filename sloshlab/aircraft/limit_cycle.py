@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from sloshlab.aeroelastic.gust import GustShape
 from sloshlab.aircraft.linear_flight import LinearFlight
-from sloshlab.aircraft.response_readings import LimitCycle, limit_cycle_of
+from sloshlab.aircraft.oscillation_measures import LimitCycle, limit_cycle_of
 from sloshlab.aircraft.tank_simulation import FlightResponse, VerticalForce, simulate_flight
 
 FloatArray = npt.NDArray[np.float64]

@@ -15,7 +15,7 @@ from sloshlab.aircraft.beam_wing import wing_model
 from sloshlab.aircraft.limit_cycle import Settling, followed, settle
 from sloshlab.aircraft.linear_flight import LinearFlight, linear_flight
 from sloshlab.aircraft.model import AircraftModel
-from sloshlab.aircraft.response_readings import damping_between_peaks, limit_cycle_of
+from sloshlab.aircraft.oscillation_measures import damping_between_peaks, limit_cycle_of
 from sloshlab.aircraft.wing_energy import CriticalMode, EnergyMap, TankWork
 
 RANDOM = np.random.default_rng(5)

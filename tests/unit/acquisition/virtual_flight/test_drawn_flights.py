@@ -10,7 +10,7 @@ import pytest
 
 from acquisition.virtual_flight.described_wing import read_wing, with_spanwise_tanks
 from acquisition.virtual_flight.drawn_effects import SINGLES
-from acquisition.virtual_flight.drawn_flights import FlightDrawing, _in_proportion
+from acquisition.virtual_flight.drawn_flights import Flight, FlightDrawing, _in_proportion
 from acquisition.virtual_flight.flight_test import CARD
 from acquisition.virtual_flight.hidden_physics import HiddenFlight
 from acquisition.virtual_flight.recorded_flight import Laboratory
@@ -22,8 +22,9 @@ WING = read_wing(Path(__file__).parents[4] / "docs/examples/flight_wing.toml")
 
 
 @pytest.fixture(scope="module")
-def drawing() -> FlightDrawing:
-    return FlightDrawing(WING, 3)
+def flights() -> list[Flight]:
+    """One that hides nothing, two with an effect, one look-alike."""
+    return FlightDrawing(WING, 3).flights(4)
 
 
 def test_classes_of_sixty_flights() -> None:
@@ -31,20 +32,27 @@ def test_classes_of_sixty_flights() -> None:
     assert len(_in_proportion(7)) == 7
 
 
-def test_truths_are_what_a_challenge_takes(drawing: FlightDrawing) -> None:
-    flights = drawing.flights(4)
+def test_truths_are_what_a_challenge_takes(flights: list[Flight]) -> None:
     vocabulary = known_vocabulary()
     for flight in flights:
         truth = marked_truth(flight.name, stated_truth(flight.truth, flight.name), vocabulary)
         assert (flight.hidden == HiddenFlight()) == (truth["kind"] == "nothing")
-        for effect in truth["effects"]:
-            assert effect["strength"] >= 4.0
 
 
-def test_the_same_seed_draws_the_same_and_another_another(drawing: FlightDrawing) -> None:
-    first, again = (each.flights(2)[1] for each in (drawing, FlightDrawing(WING, 3)))
+def test_strengths_are_those_of_the_case(flights: list[Flight]) -> None:
+    for flight in flights:
+        for effect in flight.truth.get("effects", ()):
+            found = ShownChange(flight.wing, flight.laboratory, flight.card, [*flight.seed, 0])
+            assert found.strength(flight.hidden) == pytest.approx(effect["strength"])
+            assert effect["strength"] > (2.0 if flight.truth["hidden"] == "look_alikes" else 3.3)
+
+
+def test_the_same_seed_draws_the_same_and_another_another() -> None:
+    first, again = (max(FlightDrawing(WING, 3).flights(2), key=lambda f: len(f.truth)) for _ in range(2))
+    assert first.truth["effects"]
     assert (first.truth, first.laboratory, first.card) == (again.truth, again.laboratory, again.card)
-    assert FlightDrawing(WING, 4).flights(2)[1].laboratory != first.laboratory
+    other = FlightDrawing(WING, 4)._flight(0, "nothing", [])
+    assert other.laboratory != FlightDrawing(WING, 3)._flight(0, "nothing", []).laboratory
 
 
 @pytest.fixture(scope="module")
@@ -86,8 +94,8 @@ def test_a_liquid_shows_its_inertia_in_pitch_but_in_slender_tanks(shown: ShownCh
     assert shown.told_apart(heavier(0.001), heavier) < 1e-3
 
 
-def test_look_alikes_are_of_slender_tanks(drawing: FlightDrawing) -> None:
-    of_class = {flight.truth["hidden"]: flight for flight in drawing.flights(10)}
+def test_look_alikes_are_of_slender_tanks(flights: list[Flight]) -> None:
+    of_class = {flight.truth["hidden"]: flight for flight in flights}
     flight = of_class["look_alikes"]
     assert flight.wing.tanks[0].width_m > 0.5 > of_class["effects"].wing.tanks[0].width_m
     assert {flight.truth["effects"][0]["name"], *flight.truth["equals"][0]} == {"effective_mass", "fuel_state"}
