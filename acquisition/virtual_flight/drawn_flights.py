@@ -104,7 +104,7 @@ class FlightDrawing:
         return found
 
     def _flight(self, number: int, kind: str, draws: Sequence[Draw]) -> Flight:
-        """A flight with the first of some effects that can be drawn there as its class asks; another one if none."""
+        """A flight with the first of some effects that can be drawn there as its class asks; or another one."""
         for attempt in range(_MOST_ATTEMPTS):
             own = [self._seed, number, attempt]
             flight = self._empty(f"case_{number + 1:03d}", kind, own)

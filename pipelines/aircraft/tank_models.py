@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from sloshlab.aircraft.drifting_tank import DriftFree, corner_of_drift_hz
+from sloshlab.aircraft.drifting_tank import model_in_drifting_tank
 from sloshlab.aircraft.model import AircraftModel, AircraftTank
 from sloshlab.aircraft.tank_simulation import FlightResponse, VerticalForce
 from sloshlab.aircraft.vertical_sloshing import TankDeparture, model_in_tank, tank_departures
@@ -48,13 +48,8 @@ class TankModels:
             Of the ensemble; `model` itself if not given.
         """
         chosen = self._chosen(member)
-        return {tank.name: self._in_tank(chosen, tank) for tank in self.tanks}
-
-    def _in_tank(self, model: ReducedOrderModel, tank: AircraftTank) -> VerticalForce:
-        stepped, corner_hz = model_in_tank(model, tank), corner_of_drift_hz(model)
-        if not self.can_drift or corner_hz is None:
-            return stepped
-        return DriftFree(stepped, corner_hz * stepped.sampling_rate_hz / model.sampling_rate_hz)
+        in_tank = model_in_drifting_tank if self.can_drift else model_in_tank
+        return {tank.name: in_tank(chosen, tank) for tank in self.tanks}
 
     def departures(self, response: FlightResponse, member: int | None = None) -> list[TankDeparture]:
         """What to flag of a simulation with `forces`, tank by tank."""

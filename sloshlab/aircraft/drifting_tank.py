@@ -13,7 +13,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from sloshlab.aircraft.model import AircraftTank
 from sloshlab.aircraft.tank_simulation import VerticalForce
+from sloshlab.aircraft.vertical_sloshing import model_in_tank
 from sloshlab.reduced_order_model.model import ReducedOrderModel
 from sloshlab.reduced_order_model.validity_domain import BINS_PER_OCTAVE, ValidityDomain
 
@@ -75,3 +77,17 @@ def corner_of_drift_hz(model: ReducedOrderModel) -> float | None:
         return None
     domain = ValidityDomain.of_facts(model.facts["domain"])
     return float(_SHARE_OF_LOWEST * 2 ** (domain.first_bin / BINS_PER_OCTAVE))
+
+
+def model_in_drifting_tank(model: ReducedOrderModel, tank: AircraftTank) -> VerticalForce:
+    """A trained model in the units of a tank of a free aircraft; as in a clamped one if its training is not told.
+
+    Parameters
+    ----------
+    model : ReducedOrderModel
+    tank : AircraftTank
+    """
+    stepped, corner_hz = model_in_tank(model, tank), corner_of_drift_hz(model)
+    if corner_hz is None:
+        return stepped
+    return DriftFree(stepped, corner_hz * stepped.sampling_rate_hz / model.sampling_rate_hz)
