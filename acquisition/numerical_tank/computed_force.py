@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,15 @@ Progress = Callable[[float], None]
 # of computing: what a kill or a power cut costs
 SAVED_EVERY_S: Final = 20.0
 _BLOCK_S: Final = 0.1
+
+
+class SampledSetup(Protocol):
+    """A tank whose force is wanted as samples."""
+
+    @property
+    def sampling_rate_hz(self) -> float | None:
+        """Samples per second; None if it was not stated."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -223,7 +232,7 @@ class _Computation(LongComputation):
         self._means[: means.size] = means
 
 
-def _n_samples(setup: Any, duration_s: float) -> int:
+def _n_samples(setup: SampledSetup, duration_s: float) -> int:
     if setup.sampling_rate_hz is None:
         raise InputError("sampling_rate_hz of the tank", got="none", allowed="1 … 1e6")
     if not (math.isfinite(duration_s) and duration_s * setup.sampling_rate_hz >= 1):

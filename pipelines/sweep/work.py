@@ -69,7 +69,15 @@ class WorkSettings(SweepOptions):
             )
         [(quantity, motion)] = named.items()
         windows = WindowSettings(half_width_cycles=p, spacing_cycles=m)
-        return cls(windows, "measured", True, force, motion, quantity, phase_reference)
+        return cls(
+            windows,
+            "measured",
+            True,
+            force=force,
+            motion=motion,
+            motion_quantity=quantity,
+            phase_reference=phase_reference,
+        )
 
 
 def analyse_work(
