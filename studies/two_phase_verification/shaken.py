@@ -60,6 +60,18 @@ class Shaking:
         """One that no other has."""
         return ", ".join(f"{key}={value:g}" for key, value in asdict(self).items())
 
+    @property
+    def differs(self) -> str:
+        """What is not as usual."""
+        usual = Shaking(0.0, 0.0)
+        told = {
+            "surface_tension_n_per_m": "σ = 0",
+            "hold": "walls slip",
+            "layer_frequency_hz": "walls before and behind",
+            "seed": f"seed {self.seed}",
+        }
+        return ", ".join(text for name, text in told.items() if getattr(self, name) != getattr(usual, name))
+
 
 @dataclass(frozen=True)
 class Shaken:
@@ -152,16 +164,18 @@ MAP: Final = (
 )
 COARSE: Final = tuple(replace(case, cells_per_height=16) for case in MAP)
 RESOLUTION: Final = tuple(Shaking(2.04, 10.7, 30, cells_per_height=cells) for cells in (16, 24, 32, 48))
+_WEAK: Final = (Shaking(0.5, 11.4, 100, 16), Shaking(1.0, 11.4, 60, 16))
 CAUSES: Final = (
-    Shaking(0.5, 11.4, 100, layer_frequency_hz=5.7),
-    Shaking(1.0, 11.4, 60, layer_frequency_hz=5.7),
-    Shaking(1.0, 11.4, 60, surface_tension_n_per_m=0.0),
-    Shaking(0.5, 11.4, 100, surface_tension_n_per_m=0.0),
-    Shaking(4.0, 11.4, 30, surface_tension_n_per_m=0.0),
-    Shaking(4.0, 11.4, 30, hold=False),
-    Shaking(4.0, 11.4, 30, cells_per_height=32),
+    *(replace(case, layer_frequency_hz=case.frequency_hz / 2) for case in _WEAK),
+    *(replace(case, surface_tension_n_per_m=0.0) for case in _WEAK),
+    *(replace(case, hold=False) for case in _WEAK),
+    *(replace(case, seed=1) for case in _WEAK),
+    Shaking(4.0, 11.4, 30, 16, surface_tension_n_per_m=0.0),
+    Shaking(4.0, 11.4, 30, 16, hold=False),
+    Shaking(4.0, 11.4, 30, 16, seed=1),
 )
 POINTS: Final = {"map": MAP, "coarse": COARSE, "resolution": RESOLUTION, "causes": CAUSES}
+"""What can be computed, by name; the causes change one thing at a time on the coarse grid."""
 
 
 def rows(results: dict[str, dict[str, Any]], cases: Sequence[Shaking]) -> list[str]:
@@ -173,17 +187,17 @@ def rows(results: dict[str, dict[str, Any]], cases: Sequence[Shaking]) -> list[s
         As in the file.
     cases : sequence of Shaking
     """
-    lines = ["| motion | cells | W̄ | β | advection | viscosity | pressure | residual | s per s |"]
-    lines.append("|---|---|---|---|---|---|---|---|---|")
+    lines = ["| motion | cells | with | W̄ | β | advection | viscosity | blows | place | residual | s/s |"]
+    lines.append("|---|---|---|---|---|---|---|---|---|---|---|")
     for case in cases:
         if (found := results.get(case.name)) is None:
             continue
         shares = found["shares"]
         lines.append(
-            f"| {case.acceleration_g:g} g, {case.frequency_hz:g} Hz | {case.cells_per_height} |"
+            f"| {case.acceleration_g:g} g, {case.frequency_hz:g} Hz | {case.cells_per_height} | {case.differs} |"
             f" {found['w_bar']:.2f} ± {found['w_bar_scatter'] / math.sqrt(case.n_cycles // 2):.2f} |"
             f" {found['beta']:.3f} | {100 * shares['advection']:.0f} % | {100 * shares['viscosity']:.0f} % |"
-            f" {100 * shares['pressure']:.0f} % | {100 * found['residual_share']:.1f} % |"
+            f" {100 * shares['pressure']:.0f} % | {100 * shares['place']:.0f} % | {100 * found['residual_share']:.1f} % |"
             f" {found['computing_s_per_s']:.0f} |".replace("-", "−")
         )
     return lines

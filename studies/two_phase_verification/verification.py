@@ -18,6 +18,7 @@ QUICK: Final[tuple[Callable[[], list[Finding]], ...]] = (
     lambda: standing_wave(16),
     lambda: standing_wave(24),
     lambda: standing_wave(32),
+    lambda: standing_wave(40),
     lambda: standing_wave(32, mode=2),
     lambda: drop(20),
     lambda: drop(40),
