@@ -44,6 +44,7 @@ class Shaking:
     hold : bool
         Whether the walls in the plane hold the fluids.
     seed : int
+    gas_density_kg_per_m3 : float
     """
 
     acceleration_g: float
@@ -54,6 +55,7 @@ class Shaking:
     layer_frequency_hz: float = 0.0
     hold: bool = True
     seed: int = 0
+    gas_density_kg_per_m3: float = Fluids().gas_density_kg_per_m3
 
     @property
     def name(self) -> str:
@@ -69,6 +71,7 @@ class Shaking:
             "hold": "walls slip",
             "layer_frequency_hz": "walls before and behind",
             "seed": f"seed {self.seed}",
+            "gas_density_kg_per_m3": f"gas of {self.gas_density_kg_per_m3:g} kg/m³",
         }
         return ", ".join(text for name, text in told.items() if getattr(self, name) != getattr(usual, name))
 
@@ -116,7 +119,9 @@ def shaken(case: Shaking) -> Shaken:
         TANK,
         0.5,
         case.cells_per_height,
-        fluids=Fluids(surface_tension_n_per_m=case.surface_tension_n_per_m),
+        fluids=Fluids(
+            surface_tension_n_per_m=case.surface_tension_n_per_m, gas_density_kg_per_m3=case.gas_density_kg_per_m3
+        ),
         walls=Walls(hold=case.hold, layer_frequency_hz=case.layer_frequency_hz),
         seed=case.seed,
     )
@@ -173,6 +178,7 @@ CAUSES: Final = (
     Shaking(4.0, 11.4, 30, 16, surface_tension_n_per_m=0.0),
     Shaking(4.0, 11.4, 30, 16, hold=False),
     Shaking(4.0, 11.4, 30, 16, seed=1),
+    Shaking(4.0, 11.4, 30, 16, gas_density_kg_per_m3=0.12),
 )
 POINTS: Final = {"map": MAP, "coarse": COARSE, "resolution": RESOLUTION, "causes": CAUSES}
 """What can be computed, by name; the causes change one thing at a time on the coarse grid."""
@@ -193,11 +199,12 @@ def rows(results: dict[str, dict[str, Any]], cases: Sequence[Shaking]) -> list[s
         if (found := results.get(case.name)) is None:
             continue
         shares = found["shares"]
+        given = [shares[name] for name in ("advection", "viscosity", "pressure", "place")]
+        given_text = " | ".join(f"{100 * share:.0f} %" for share in given)
         lines.append(
             f"| {case.acceleration_g:g} g, {case.frequency_hz:g} Hz | {case.cells_per_height} | {case.differs} |"
             f" {found['w_bar']:.2f} ± {found['w_bar_scatter'] / math.sqrt(case.n_cycles // 2):.2f} |"
-            f" {found['beta']:.3f} | {100 * shares['advection']:.0f} % | {100 * shares['viscosity']:.0f} % |"
-            f" {100 * shares['pressure']:.0f} % | {100 * shares['place']:.0f} % | {100 * found['residual_share']:.1f} % |"
+            f" {found['beta']:.3f} | {given_text} | {100 * found['residual_share']:.1f} % |"
             f" {found['computing_s_per_s']:.0f} |".replace("-", "−")
         )
     return lines
