@@ -18,6 +18,7 @@ TERMS: Final = (
     "pressure",
     "surface",
     "place",
+    "gravity",
     "clipped",
     "iterations",
     "parts",
@@ -32,6 +33,7 @@ TERMS: Final = (
     PRESSURE,
     SURFACE,
     PLACE,
+    GRAVITY,
     CLIPPED,
     ITERATIONS,
     PARTS,
@@ -62,6 +64,9 @@ class TwoPhaseAccount:
     place_j_per_m : float
         Taken by the force that stands for the place of the interface between the points of the grid, as far as
         the tank's motion and not gravity makes it; negative where it gives some.
+    height_j_per_m : float
+        Taken when the liquid is carried: what gravity did on the momentum and that the heights of the lines did
+        not gain. Volumes cut by lines and the means of densities that momentum has differ by it.
     """
 
     kinetic_j_per_m: float
@@ -74,6 +79,7 @@ class TwoPhaseAccount:
     pressure_j_per_m: float
     interface_j_per_m: float
     place_j_per_m: float
+    height_j_per_m: float
 
     @property
     def gained_j_per_m(self) -> float:
@@ -84,7 +90,7 @@ class TwoPhaseAccount:
     def lost_j_per_m(self) -> float:
         """Sum of all losses."""
         sinks = self.viscosity_j_per_m + self.wall_drag_j_per_m + self.advection_j_per_m
-        return sinks + self.pressure_j_per_m + self.interface_j_per_m + self.place_j_per_m
+        return sinks + self.pressure_j_per_m + self.interface_j_per_m + self.place_j_per_m + self.height_j_per_m
 
     @property
     def residual_j_per_m(self) -> float:
@@ -115,7 +121,7 @@ def account(gained_j_per_m: Sequence[float], sums: NDArray[np.float64]) -> TwoPh
     kinetic, potential, surface = gained_j_per_m
     viscosity, drag, carried, pressure = (float(sums[term]) for term in (VISCOSITY, DRAG, CARRIED, PRESSURE))
     given, pushed = float(sums[TANK_WORK] + sums[ROLL_WORK]), float(sums[SURFACE])
-    interface, place = -(surface + pushed), -float(sums[PLACE])
+    interface, place, height = -(surface + pushed), -float(sums[PLACE]), -(potential + float(sums[GRAVITY]))
     return TwoPhaseAccount(
-        kinetic, potential, surface, given, viscosity, drag, carried, pressure, interface, place
+        kinetic, potential, surface, given, viscosity, drag, carried, pressure, interface, place, height
     )

@@ -21,6 +21,7 @@ from acquisition.two_phase_tank.energy import (
     CARRIED,
     CLIPPED,
     DRAG,
+    GRAVITY,
     ITERATIONS,
     PARTS,
     PLACE,
@@ -194,7 +195,7 @@ def _works(state, work, body, acceleration, dt, k_, sums):  # type: ignore[no-un
     """
     u, w, p = state.u, state.w, state.p
     nx, nz = state.c.shape
-    along = up = roll = surface = place = pressure = 0.0
+    along = up = roll = surface = place = falling = pressure = 0.0
     for i in range(1, nx):
         for k in range(nz):
             carried = 0.5 * (work.ut[i, k] + u[i, k])
@@ -203,6 +204,7 @@ def _works(state, work, body, acceleration, dt, k_, sums):  # type: ignore[no-un
             along += mean / work.bx[i, k]
             roll += mean * (fx + acceleration[0]) / work.bx[i, k]
             surface += mean * work.uc[i, k] / work.bx[i, k]
+            falling -= mean * k_.gravity * work.uz[i, k] / work.bx[i, k]
             place += mean * (work.us[i, k] - work.uc[i, k] + k_.gravity * work.uz[i, k]) / work.bx[i, k]
             pressure += carried * (p[i, k] - p[i - 1, k]) / k_.dx
             pressure -= (carried - mean) * (fx + work.us[i, k]) / work.bx[i, k]
@@ -214,6 +216,7 @@ def _works(state, work, body, acceleration, dt, k_, sums):  # type: ignore[no-un
             up += mean / work.bz[i, k]
             roll += mean * (fz + acceleration[1] + k_.gravity) / work.bz[i, k]
             surface += mean * work.wc[i, k] / work.bz[i, k]
+            falling -= mean * k_.gravity * (1.0 + work.wz[i, k]) / work.bz[i, k]
             place += mean * (work.ws[i, k] - work.wc[i, k] + k_.gravity * work.wz[i, k]) / work.bz[i, k]
             pressure += carried * (p[i, k] - p[i, k - 1]) / k_.dz
             pressure -= (carried - mean) * (fz + work.ws[i, k]) / work.bz[i, k]
@@ -222,6 +225,7 @@ def _works(state, work, body, acceleration, dt, k_, sums):  # type: ignore[no-un
     sums[ROLL_WORK] += roll * volume
     sums[SURFACE] += surface * volume
     sums[PLACE] += place * volume
+    sums[GRAVITY] += falling * volume
     sums[PRESSURE] += pressure * volume
 
 
