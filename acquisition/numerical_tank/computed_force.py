@@ -237,7 +237,7 @@ def _n_samples(setup: SampledSetup, duration_s: float) -> int:
         raise InputError("sampling_rate_hz of the tank", got="none", allowed="1 … 1e6")
     if not (math.isfinite(duration_s) and duration_s * setup.sampling_rate_hz >= 1):
         raise InputError("duration_s", got=f"{duration_s}", allowed="at least one sample, finite")
-    return round(duration_s * setup.sampling_rate_hz)
+    return round(duration_s * float(setup.sampling_rate_hz))
 
 
 def _identity(setup: Any, motion: VerticalMotion, n_samples: int) -> NDArray[np.uint8]:
