@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import xarray as xr
@@ -68,7 +69,7 @@ def laboratory_w_bar(point: DrivenPoint) -> float:
 
 
 def interfoam_liquid(
-    results: Mapping[InterfoamCase, KeptResult], cells_over_height: int = REFERENCE_CELLS
+    results: Mapping[InterfoamCase, KeptResult], cells_over_height: int = REFERENCE_CELLS, **changed: Any
 ) -> dict[DrivenPoint, PointValues]:
     """The reference at the points at which it was computed.
 
@@ -76,8 +77,10 @@ def interfoam_liquid(
     ----------
     results : mapping
     cells_over_height : int
+    **changed
+        Of `InterfoamCase`.
     """
-    found = {point: results.get(case_at(point, cells_over_height)) for point in POINTS}
+    found = {point: results.get(case_at(point, cells_over_height, **changed)) for point in POINTS}
     return {point: values_of(result) for point, result in found.items() if result is not None}
 
 
@@ -161,27 +164,30 @@ def account_table(results: Mapping[InterfoamCase, KeptResult]) -> Iterator[str]:
     results : mapping
     """
     yield (
-        "| point | cells over h | W̄ at the walls | W̄ by momentum | resolved viscosity | stored | scheme |"
+        "| point | solver, cells | W̄ at the walls | W̄ by momentum | resolved viscosity | stored | scheme |"
         " volume | height |"
     )
     yield "|" + "---|" * 9
-    for point in POINTS:
-        for cells in sorted({case.cells_over_height for case in results}):
-            result = results.get(case_at(point, cells))
-            if result is None:
-                continue
-            numbers = (
-                result.counted("w_bar").value,
-                result.counted("body_force_w_bar").value,
-                result.viscous_w_bar,
-                result.stored_w_bar,
-                result.scheme_w_bar,
-            )
-            listed = " | ".join(f"{number:.3f}" for number in numbers).replace("-", "−")
-            yield (
-                f"| {point.label} | {cells} | {listed} | {100 * result.largest_volume_change:.2g} % |"
-                f" {result.height_over_rest:.2f} |"
-            )
+    kinds = sorted({(case.solver, case.cells_over_height) for case in results})
+    for point, (solver, cells) in itertools.product(POINTS, kinds):
+        result = results.get(case_at(point, cells, solver=solver))
+        if result is not None:
+            yield _account_row(point, result)
+
+
+def _account_row(point: DrivenPoint, result: KeptResult) -> str:
+    numbers = (
+        result.counted("w_bar").value,
+        result.counted("body_force_w_bar").value,
+        result.viscous_w_bar,
+        result.stored_w_bar,
+        result.scheme_w_bar,
+    )
+    listed = " | ".join(f"{number:.3f}" for number in numbers).replace("-", "−")
+    return (
+        f"| {point.label} | `{result.case.solver}`, h/{result.case.cells_over_height} | {listed} |"
+        f" {100 * result.largest_volume_change:.2g} % | {result.height_over_rest:.2f} |"
+    )
 
 
 def change_table(results: Mapping[InterfoamCase, KeptResult]) -> Iterator[str]:

@@ -23,10 +23,20 @@ from studies.tank_reference.dry_mass import balance_table, shifted_balance
 from studies.tank_reference.interfoam_case import InterfoamCase
 from studies.tank_reference.kept_results import KeptResult
 from studies.tank_reference.particle_runs import ParticleCase, ParticleResult
-from studies.tank_reference.planned_cases import CHANGES, FINER_CELLS, PAIRS, VARIED_POINTS, changed_case
+from studies.tank_reference.planned_cases import (
+    CHANGES,
+    FINER_CELLS,
+    GEOMETRIC,
+    PAIRS,
+    VARIED_POINTS,
+    changed_case,
+)
+from studies.tank_reference.second_liquid import second_liquid
 
 PRESENT: Final = "present tank"
+ALGEBRAIC: Final = "interFoam"
 REFERENCE: Final = "reference"
+SECOND: Final = "second liquid"
 _MARK: Final = {True: "yes", False: "**no**", None: "–"}
 
 
@@ -42,9 +52,11 @@ def shown_liquids(
     """
     liquids: dict[str, Liquid] = {
         PRESENT: particle_liquid(particles),
-        f"{REFERENCE}, h/12": interfoam_liquid(interfoam),
+        GEOMETRIC: interfoam_liquid(interfoam, solver=GEOMETRIC),
+        ALGEBRAIC: interfoam_liquid(interfoam),
     }
-    liquids |= {f"{REFERENCE}, h/{cells}": interfoam_liquid(interfoam, cells) for cells in FINER_CELLS}
+    liquids[SECOND] = second_liquid()
+    liquids |= {f"{ALGEBRAIC}, h/{cells}": interfoam_liquid(interfoam, cells) for cells in FINER_CELLS}
     return {name: liquid for name, liquid in liquids.items() if liquid}
 
 

@@ -26,6 +26,7 @@ from studies.tank_reference.kept_results import kept_result, read_results, write
 from studies.tank_reference.particle_runs import ParticleCase, read_particles
 from studies.tank_reference.planned_cases import CHANGES, planned_cases
 from studies.tank_reference.points import BEAM_POINT, COMMON_POINTS, DrivenPoint
+from studies.tank_reference.second_liquid import second_liquid
 from studies.tank_reference.steady_state import MeanOverCycles, mean_over_cycles
 
 POINT = DrivenPoint(2.0, 10.0)
@@ -260,3 +261,38 @@ def test_a_liquid_that_agrees_lacks_nothing_and_one_without_runs_is_unknown() ->
     assert (
         verdict(liquid(0.0, 1.6, 0.3), {"half": {CHOOSING[0]: liquid(0, 0, 0)[CHOOSING[0]]}}).answer == "unknown"
     )
+
+
+SECOND = {
+    "acceleration_g": 4.0,
+    "frequency_hz": 11.4,
+    "n_cycles": 32,
+    "cells_per_height": 24,
+    "surface_tension_n_per_m": 0.0728,
+    "layer_frequency_hz": 0.0,
+    "hold": True,
+    "seed": 0,
+}
+
+
+def test_second_liquid_is_read_where_it_is(tmp_path) -> None:
+    assert second_liquid(tmp_path / "map.json") == {}
+    result = {"w_bar": 0.8, "w_bar_scatter": 0.2, "beta": -0.1}
+    cases = {
+        "fine": {**result, "case": SECOND},
+        "coarse": {**result, "w_bar": 0.7, "case": {**SECOND, "cells_per_height": 16}},
+        "finest": {
+            **result,
+            "w_bar": 0.5,
+            "case": {**SECOND, "cells_per_height": 32, "surface_tension_n_per_m": 0},
+        },
+    }
+    (tmp_path / "map.json").write_text(json.dumps(cases))
+    found = second_liquid(tmp_path / "map.json")
+    assert list(found) == [DrivenPoint(4.0, 11.4)]
+    values = found[DrivenPoint(4.0, 11.4)]
+    # the finest between walls that hold; 16 cycles count
+    assert (values.w_bar.value, values.w_bar.standard_error, values.beta.value) == (0.8, pytest.approx(0.05), -0.1)
+    (tmp_path / "map.json").write_text('{"4 g": {}}')
+    with pytest.raises(InputError, match="allowed: results of the second liquid's study"):
+        second_liquid(tmp_path / "map.json")
