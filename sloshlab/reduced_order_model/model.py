@@ -13,6 +13,7 @@ from sloshlab.reduced_order_model import free_run
 from sloshlab.reduced_order_model.agitation import Agitation
 from sloshlab.reduced_order_model.array_backend import ArrayBackend, array_backend
 from sloshlab.reduced_order_model.break_up import BreakUp
+from sloshlab.reduced_order_model.fill_input import FillInput
 from sloshlab.reduced_order_model.networks.network import Network
 from sloshlab.reduced_order_model.networks.radial_basis import NormalisedRadialBasis, RadialBasis
 from sloshlab.reduced_order_model.regressors import Delays, Run, regressors, segments
@@ -50,11 +51,20 @@ class Scaling:
         return values * self.output_scale + self.output_offset
 
 
-def scaled_run(run: Run, scaling: Scaling, agitation: Agitation | None, sampling_rate_hz: float) -> Run:
-    """Return a run in the network's values, with the states of the liquid if the model has a memory of them."""
-    if agitation is None:
+def scaled_run(
+    run: Run,
+    scaling: Scaling,
+    agitation: Agitation | None,
+    sampling_rate_hz: float,
+    fill: FillInput | None = None,
+) -> Run:
+    """Return a run in the network's values, with the states of the liquid and the fill that the model sees."""
+    if agitation is None and fill is None:
         return scaling.scaled(run)
-    return replace(scaling.scaled(run), states=agitation.regressors(run.x, sampling_rate_hz))
+    rows = [] if agitation is None else list(agitation.regressors(run.x, sampling_rate_hz))
+    if fill is not None:
+        rows.append(fill.regressor(run.x.size, run.fill_level))
+    return replace(scaling.scaled(run), states=np.stack(rows))
 
 
 @dataclass(frozen=True)
@@ -75,6 +85,8 @@ class ReducedOrderModel:
         Memory of the liquid's state: slow states seen beside the delay line. A run then begins at rest.
     break_up : BreakUp, optional
         Memory of the liquid's state: a gain on the output. A run then begins at rest.
+    fill : FillInput, optional
+        The fill level among the regressors; `at_fill` says which.
     """
 
     network: Network
@@ -85,10 +97,12 @@ class ReducedOrderModel:
     facts: dict[str, Any] = field(default_factory=dict)
     agitation: Agitation | None = None
     break_up: BreakUp | None = None
+    fill: FillInput | None = None
 
     def __post_init__(self) -> None:
-        n_states = 0 if self.agitation is None else self.agitation.n_states
-        if self.delays.n_states != n_states or (self.agitation and len(self.agitation.scales) != n_states):
+        n_remembered = 0 if self.agitation is None else self.agitation.n_states
+        n_states = n_remembered + (self.fill is not None)
+        if self.delays.n_states != n_states or (self.agitation and len(self.agitation.scales) != n_remembered):
             allowed = f"{self.delays.n_states} scaled states, as many as among the regressors"
             raise InputError("memory of the model", got=f"{n_states} states", allowed=allowed)
         # a break-up is a gain on a model of the steady state: fed back, its output would not be what the network
@@ -111,6 +125,23 @@ class ReducedOrderModel:
         """Whether it sees its own outputs."""
         return bool(self.delays.outputs)
 
+    def at_fill(self, level: float) -> ReducedOrderModel:
+        """Return the model for a tank filled to a level.
+
+        Parameters
+        ----------
+        level : float
+            Height of the liquid over height of the tank.
+
+        Raises
+        ------
+        InputError
+            If the model does not see the fill level, or the level is beyond those of its training.
+        """
+        if self.fill is None:
+            raise InputError("model", got="one that does not see the fill level", allowed="one trained with it")
+        return replace(self, fill=self.fill.at(level))
+
     def predict(self, x: ArrayLike, y: ArrayLike, backend: ArrayBackend | None = None) -> FloatArray:
         """Return ŷ one step ahead; past outputs are the measured ones.
 
@@ -126,7 +157,7 @@ class ReducedOrderModel:
             NaN where a regressor is not known.
         """
         chosen = backend or array_backend()
-        run = scaled_run(Run.of(x, y), self.scaling, self.agitation, self.sampling_rate_hz)
+        run = scaled_run(Run.of(x, y), self.scaling, self.agitation, self.sampling_rate_hz, self.fill)
         # a model without feedback needs no measured output: it predicts where that is lost, too
         known = run if self.has_feedback else replace(run, y=np.nan_to_num(run.y))
         theta, predicted = chosen.asarray(self.theta), np.full(run.x.size, np.nan)

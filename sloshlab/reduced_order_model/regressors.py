@@ -28,7 +28,8 @@ class Delays:
     outputs : tuple of int
         y(k − d) for each d ≥ 1; empty for a model without feedback.
     n_states : int
-        Slow states of the run that are seen beside them, without delay; only without feedback.
+        Slow states of the run, and its fill level, that are seen beside them, without delay; only without
+        feedback.
     """
 
     inputs: tuple[int, ...]
@@ -97,12 +98,15 @@ class Run:
         For messages.
     states : ndarray, shape (n_states, n), optional
         Slow states for the regressors; NaN where nothing is known.
+    fill_level : float, optional
+        Of the tank, for models that see it.
     """
 
     x: FloatArray
     y: FloatArray
     name: str = "run"
     states: FloatArray | None = None
+    fill_level: float | None = None
 
     @classmethod
     def of(cls, x: ArrayLike, y: ArrayLike, name: str = "run") -> Run:

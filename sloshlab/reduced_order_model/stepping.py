@@ -48,8 +48,8 @@ class SteppedModel:
     """
 
     def __init__(self, model: ReducedOrderModel) -> None:
-        if model.agitation is not None:
-            got = "a model with slow states among its regressors"
+        if model.delays.n_states:
+            got = "a model with slow states or the fill level among its regressors"
             raise InputError("rom", got=got, allowed="models without, or with a break-up", remedy="train another")
         if min(model.delays.inputs) < 1:
             raise InputError(

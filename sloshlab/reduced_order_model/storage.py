@@ -19,6 +19,7 @@ from sloshlab.atomic_file import replaced
 from sloshlab.errors import InputError
 from sloshlab.reduced_order_model.agitation import Agitation
 from sloshlab.reduced_order_model.break_up import BreakUp
+from sloshlab.reduced_order_model.fill_input import FillInput
 from sloshlab.reduced_order_model.model import ReducedOrderModel, Scaling
 from sloshlab.reduced_order_model.network_list import network_of
 from sloshlab.reduced_order_model.regressors import Delays
@@ -45,6 +46,8 @@ def save_model(model: ReducedOrderModel, path: str | os.PathLike[str]) -> None:
         file.facts = json.dumps(model.facts, sort_keys=True, ensure_ascii=True)
         if model.agitation is not None:
             file.agitation = json.dumps(model.agitation.facts(), sort_keys=True)
+        if model.fill is not None:
+            file.fill = json.dumps(model.fill.facts(), sort_keys=True)
         if model.break_up is not None:
             file.break_up = json.dumps(model.break_up.facts(), sort_keys=True)
         scaling = [getattr(model.scaling, name) for name in SCALING]
@@ -121,7 +124,9 @@ def _model(source: Any) -> ReducedOrderModel:
     inputs, outputs = (
         tuple(int(d) for d in variables.get(name, ())) for name in ("input_delays", "output_delays")
     )
-    delays = Delays(inputs, outputs, 0 if agitation is None else agitation.n_states)
+    fill = FillInput.from_facts(json.loads(source.fill)) if hasattr(source, "fill") else None
+    n_states = (0 if agitation is None else agitation.n_states) + (fill is not None)
+    delays = Delays(inputs, outputs, n_states)
     return ReducedOrderModel(
         network_of(source.network.decode(), settings),
         variables["theta"].astype(np.float64),
@@ -131,4 +136,5 @@ def _model(source: Any) -> ReducedOrderModel:
         facts,
         agitation,
         BreakUp(**json.loads(source.break_up)) if hasattr(source, "break_up") else None,
+        fill,
     )

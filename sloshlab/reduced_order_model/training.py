@@ -16,6 +16,7 @@ from sloshlab.reduced_order_model import free_run
 from sloshlab.reduced_order_model.agitation import Agitation
 from sloshlab.reduced_order_model.array_backend import Array, ArrayBackend, array_backend
 from sloshlab.reduced_order_model.early_stop import EarlyStop
+from sloshlab.reduced_order_model.fill_input import FillInput
 from sloshlab.reduced_order_model.least_squares import LeastSquaresProblem, OneStepProblem, Step, next_step
 from sloshlab.reduced_order_model.model import ReducedOrderModel, Scaling, feedback_model, scaled_run
 from sloshlab.reduced_order_model.network_list import network_of
@@ -49,6 +50,8 @@ class TrainingSettings:
     input_spread : float
         Standard deviation of the regressors in the network's values, all of them together: √Σ var. With Σ⁻¹ = I
         it says how many neurons a sample feels.
+    fill_spread : float
+        Standard deviation of the fill level over the training runs in the network's values, where it is an input.
     """
 
     n_epochs: int = 100
@@ -57,6 +60,7 @@ class TrainingSettings:
     n_starts: int = 1
     seed: int = 0
     input_spread: float = 2.0
+    fill_spread: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -141,6 +145,7 @@ def fit(
     sampling_rate_hz: float,
     settings: TrainingSettings | None = None,
     agitation: Agitation | None = None,
+    with_fill: bool = False,
     backend: ArrayBackend | None = None,
     on_epoch: Callable[[Epoch], None] | None = None,
 ) -> tuple[ReducedOrderModel, TrainingRecord]:
@@ -159,6 +164,8 @@ def fit(
     settings : TrainingSettings, optional
     agitation : Agitation, optional
         Memory of the liquid's state; its scales are those of the training runs.
+    with_fill : bool
+        Whether the network sees the fill level, which every run must then tell.
     backend : ArrayBackend, optional
         NumPy by default.
     on_epoch : callable, optional
@@ -182,12 +189,16 @@ def fit(
     if agitation is not None:
         agitation = agitation.fitted([run.x for run in training], sampling_rate_hz)
         delays = replace(delays, n_states=agitation.n_states)
+    fill = None
+    if with_fill:
+        fill = FillInput.fitted([run.fill_level for run in training], chosen.fill_spread)
+        delays = replace(delays, n_states=delays.n_states + 1)
     network = network_of(kind, {**settings_of_network, "n_inputs": delays.n_regressors})
     task = _Task(
         network,
         delays,
-        [scaled_run(run, scaling, agitation, sampling_rate_hz) for run in training],
-        [scaled_run(run, scaling, agitation, sampling_rate_hz) for run in validation],
+        [scaled_run(run, scaling, agitation, sampling_rate_hz, fill) for run in training],
+        [scaled_run(run, scaling, agitation, sampling_rate_hz, fill) for run in validation],
         scaling.output_scale,
         backend or array_backend(),
     )
@@ -205,7 +216,7 @@ def fit(
         raise AnalysisError("training", got="no stable model from any start", remedy="fewer output delays")
     ended = "interrupted" if interrupted else best.ended
     theta = best.theta if basis is None else network.lifted(best.theta, basis)  # type: ignore[attr-defined]
-    model = ReducedOrderModel(network, theta, delays, scaling, sampling_rate_hz, agitation=agitation)
+    model = ReducedOrderModel(network, theta, delays, scaling, sampling_rate_hz, agitation=agitation, fill=fill)
     return model, TrainingRecord(best.epochs, best.epoch, ended, interrupted)
 
 

@@ -143,8 +143,8 @@ def term_of(model: ReducedOrderModel, rig: Rig) -> Term:
     InputError
         If the model sees the present input, does not tell its tank, or was trained at another fill level.
     """
-    if model.agitation is not None:
-        got = "a model with slow states among its regressors"
+    if model.delays.n_states:
+        got = "a model with slow states or the fill level among its regressors"
         raise InputError("rom", got=got, allowed="models without, or with a break-up", remedy="train another")
     # the force would have to wait for the motion that it makes
     if min(model.delays.inputs) < 1:
