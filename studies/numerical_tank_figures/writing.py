@@ -13,6 +13,7 @@ from pipelines.report.progress import progress
 from sloshlab import atomic_file, interrupt
 from sloshlab.errors import InputError
 from sloshlab.rig import Rig
+from studies.numerical_tank_figures.beam_release import release_plate, released
 from studies.numerical_tank_figures.film import film
 from studies.numerical_tank_figures.maps import maps_figure
 from studies.numerical_tank_figures.plates import conditions_plate, cycle_plate
@@ -29,6 +30,7 @@ from studies.numerical_tank_figures.snapshots import (
 FILE_NAMES: Final = {
     "snapshots": "tank_snapshots.png",
     "cycle": "tank_cycle.png",
+    "release": "beam_release.png",
     "film": "tank_film.gif",
     "maps": "tank_maps.png",
 }
@@ -96,6 +98,9 @@ def write_pictures(names: Sequence[str], settings: PictureSettings, folder: Path
         "snapshots": lambda: conditions_plate(_conditions(rig, settings), rig.tank),
         "cycle": lambda: cycle_plate(
             _film_snapshots(rig, settings, film_frames)[: 12 * _CYCLE_STRIDE : _CYCLE_STRIDE], rig.tank
+        ),
+        "release": lambda: release_plate(
+            released(rig, layers_per_height=settings.layers_per_height, seed=settings.seed), rig
         ),
         "film": lambda: film(_film_snapshots(rig, settings, film_frames), rig.tank),
     }

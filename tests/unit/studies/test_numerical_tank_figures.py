@@ -20,6 +20,7 @@ from sloshlab.rig import Rig
 from studies.measured_facts.map_readings import facts_of, half_filled
 from studies.numerical_tank_figures import writing
 from studies.numerical_tank_figures.__main__ import main
+from studies.numerical_tank_figures.beam_release import release_plate, released
 from studies.numerical_tank_figures.film import FRAME_MS, film, slowdown
 from studies.numerical_tank_figures.maps import maps_figure
 from studies.numerical_tank_figures.plates import conditions_plate, cycle_plate, shaking_title
@@ -156,6 +157,22 @@ def test_plates_are_repeatable_pictures_without_empty_panels(rig: Rig, cycle: li
     panels = [part for row in np.array_split(coloured, 6) for part in np.array_split(row, 2, axis=1)]
     assert min(part.mean() for part in panels) > 0.1
     assert image_of(conditions_plate(cycle[:3], rig.tank)).size[0] == colours.shape[1]
+
+
+def test_the_released_beam_throws_its_liquid_at_first_and_sways_it_later(rig: Rig) -> None:
+    """By particles above three quarters of the height, and by the decay of Table 2.4 as a bound from above."""
+    first, later = released(rig, layers_per_height=10, seed=0)
+    high = [(instant.snapshot.liquid.z_m > 0.75 * HEIGHT_M).mean() for instant in (first, later)]
+    assert high[0] > 0.15
+    assert high[1] < 0.05
+    assert later.time_s == pytest.approx(1.2, abs=2e-3)
+    # at the release the tank has 6.9 g, with frozen liquid e^(−ζωt) = 0.77 of it at that time
+    assert abs(later.acceleration_g) < 0.3 * 6.9
+    content = release_plate([first, later], rig)
+    assert content == release_plate([first, later], rig)
+    colours = np.asarray(image_of(content).convert("RGB")).astype(int)
+    coloured = (np.ptp(colours, axis=-1) > 40)[: int(0.7 * colours.shape[0])]
+    assert min(half.mean() for half in np.array_split(coloured, 2, axis=1)) > 0.1
 
 
 def test_the_film_moves_the_tank_as_told(rig: Rig, cycle: list[Snapshot]) -> None:
