@@ -32,7 +32,7 @@ DOCS_BRANCH ?= gh-pages
 export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks aircraft wing rom-study closed-loop replay campaign tank-campaign tank-scaling pictures tank-diagnosis trial flight-trial rivals test test-newest test-all lint format type bench bench-history fuzz soak wheel docs docs-publish clean tank-reference ball-network
+.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks aircraft wing rom-study closed-loop replay campaign tank-campaign tank-scaling pictures tank-diagnosis trial flight-trial rivals test test-newest test-all lint format type bench bench-history fuzz soak wheel docs docs-publish clean tank-reference ball-network fill-level
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -123,6 +123,9 @@ tank-scaling: setup  ## the scaling law tested: the numerical tank at seven size
 	  --still raw_data/numerical_tank/shaker/fill_0.50_empty_3.00g.nc \
 	  --still raw_data/numerical_tank/shaker/fill_0.50_frozen_3.00g.nc --delays 60 --neurons 20 --no-report -o $(SCALING_ROM)
 	$(BIN)/python -m studies.tank_scaling $(RESULTS)/tank_scaling --model $(SCALING_ROM)
+
+fill-level: setup  ## the fill level as an input of the network: five fills, each left out (20 min; goes on where it was stopped)
+	$(BIN)/python -m studies.fill_level $(RESULTS)/fill_level
 
 pictures: setup  ## the snapshots and the film of the numerical tank in docs/images again (minutes)
 	$(BIN)/python -m studies.numerical_tank_figures --rig raw_data/shaker/rig_fill_0.50.toml
