@@ -116,7 +116,9 @@ def draw(history: list[dict[str, Any]], path: Path = FIGURE) -> None:
     axes.set_xticks(range(len(history)), [f"{e['date']}\n{e['revision']}" for e in history], fontsize=7)
     axes.grid(False)
     for row, column in zip(*np.nonzero(np.isfinite(values)), strict=True):
-        axes.text(column, row, f"{2 ** values[row, column]:.2g}", ha="center", va="center", fontsize=6)
+        dark = abs(values[row, column]) > 2
+        used_up = f"{2 ** values[row, column]:.2g}"
+        axes.text(column, row, used_up, ha="center", va="center", fontsize=6, color="w" if dark else "k")
     bar = figure.colorbar(shown, ax=axes, shrink=0.5, ticks=[-3, -1, 0, 1, 3])
     bar.ax.set_yticklabels(["⅛", "½", "1, the aim", "2", "8"], fontsize=7)
     bar.set_label("share of the aim that is used; above 1 missed", fontsize=7)

@@ -24,7 +24,7 @@ from tests.benchmarks.twin import DEFLECTION_M, beam, best_of
 
 N_DELAYS, N_NEURONS, MODEL_RATE_HZ = 60, 20, 512.0
 OUTPUT_RATE_HZ, N_STEPS = 1024.0, 2
-LOOP_LABEL = "twin: 10 s of beam and model 60×20 at 2 kHz [s]"
+LOOP_LABEL = "twin: 10 s of beam and model 60×20 [s]"
 ERROR_LABEL = "twin: its error over 1 s, over the largest velocity"
 RIG = Rig.from_toml_text(
     "[tank]\nheight_m = 0.0272\nlength_m = 0.1172\nwidth_m = 0.078\ndry_mass_kg = 0.314\n"
