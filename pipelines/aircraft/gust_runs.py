@@ -81,13 +81,13 @@ class GustedAircraft:
         shape = one_minus_cosine(
             gust.amplitude_m_per_s, gust_length_m=gust.length_m, speed_m_per_s=gust.speed_m_per_s
         )
-        sloshes = LIQUID_MODELS[model][1] and self.tanks is not None
-        forces = self.tanks.forces(member) if sloshes and self.tanks is not None else None
-        response = simulate_flight(
-            flight, forces, duration_s=duration_s, output_step_s=self.output_step_s, gust=shape
-        )
-        left = self.tanks.departures(response, member) if sloshes and self.tanks is not None else []
-        return RecordedResponse(model, response, tuple(left))
+        step_s = self.output_step_s
+        if LIQUID_MODELS[model][1] and self.tanks is not None:
+            return self.tanks.flown(
+                model, flight, shape, duration_s=duration_s, output_step_s=step_s, member=member
+            )
+        response = simulate_flight(flight, duration_s=duration_s, output_step_s=step_s, gust=shape)
+        return RecordedResponse(model, response)
 
 
 def recorded_case(gust: GustCase, runs: Sequence[RecordedResponse]) -> RecordedCase:

@@ -6,9 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from pipelines.aircraft.response_file import RecordedResponse
+from sloshlab.aeroelastic.gust import GustShape
 from sloshlab.aircraft.drifting_tank import model_in_drifting_tank
+from sloshlab.aircraft.linear_flight import LinearFlight
 from sloshlab.aircraft.model import AircraftModel, AircraftTank
-from sloshlab.aircraft.tank_simulation import FlightResponse, VerticalForce
+from sloshlab.aircraft.tank_simulation import FlightResponse, VerticalForce, simulate_flight
 from sloshlab.aircraft.vertical_sloshing import TankDeparture, model_in_tank, tank_departures
 from sloshlab.errors import InputError
 from sloshlab.reduced_order_model.ensemble_storage import load_ensemble
@@ -54,6 +57,33 @@ class TankModels:
     def departures(self, response: FlightResponse, member: int | None = None) -> list[TankDeparture]:
         """What to flag of a simulation with `forces`, tank by tank."""
         return tank_departures(response, dict.fromkeys((tank.name for tank in self.tanks), self._chosen(member)))
+
+    def flown(
+        self,
+        name: str,
+        flight: LinearFlight,
+        gust: GustShape,
+        *,
+        duration_s: float,
+        output_step_s: float,
+        member: int | None = None,
+    ) -> RecordedResponse:
+        """Fly a wing or an aircraft with these models in its tanks, and say which tank left its training.
+
+        Parameters
+        ----------
+        name : str
+            What the simulation is called.
+        flight : LinearFlight
+        gust : GustShape
+        duration_s, output_step_s : float
+        member : int, optional
+            Of the ensemble.
+        """
+        response = simulate_flight(
+            flight, self.forces(member), duration_s=duration_s, output_step_s=output_step_s, gust=gust
+        )
+        return RecordedResponse(name, response, tuple(self.departures(response, member)))
 
     def _chosen(self, member: int | None) -> ReducedOrderModel:
         return self.model if member is None else self.members[member]

@@ -30,6 +30,7 @@ OUTPUT_STEP_S = 5e-3
 _LARGEST_ACCELERATION_M_PER_S2 = LARGEST_ACCELERATION_G * GRAVITY_M_PER_S2
 _PASSAGE_S = 1.0
 """In which a gust has passed and frozen liquids have had their largest acceleration, if they do not diverge."""
+_LONGEST_LANDING_S = 10.0
 _SMALLER = 0.9
 _MOST_TRIES = 6
 
@@ -79,10 +80,11 @@ def gust_case(
     flight = flight_at(state.model, state.air, speed)
 
     def flown(name: str, amplitude: float, duration_s: float = settings.duration_s) -> RecordedResponse:
-        forces = tanks.forces() if name == SLOSHING else {}
         shape = gust_of(state, settings, speed, amplitude)
-        response = simulate_flight(flight, forces, duration_s=duration_s, output_step_s=OUTPUT_STEP_S, gust=shape)
-        return RecordedResponse(name, response, tuple(tanks.departures(response)) if forces else ())
+        if name == SLOSHING:
+            return tanks.flown(name, flight, shape, duration_s=duration_s, output_step_s=OUTPUT_STEP_S)
+        response = simulate_flight(flight, duration_s=duration_s, output_step_s=OUTPUT_STEP_S, gust=shape)
+        return RecordedResponse(name, response)
 
     # frozen liquids are linear: their largest acceleration tells the largest gust, the trained models then decide
     linear = _largest(flown(FROZEN, printed, min(_PASSAGE_S, settings.duration_s)))
@@ -172,14 +174,19 @@ def landing_case(
     advance : callable
     """
     flight = landing_flight(state.described, state.model, air.motion, landing)
-    runs = []
-    for name, forces in ((FROZEN, {}), (SLOSHING, tanks.forces())):
-        response = simulate_flight(
-            flight, forces, duration_s=min(settings.duration_s, 10.0), output_step_s=OUTPUT_STEP_S,
-            gust=lambda time: fuselage_velocity_m_per_s(landing, time),
-        )  # fmt: skip
-        runs.append(RecordedResponse(name, response, tuple(tanks.departures(response)) if forces else ()))
-        advance(f"landing, {name}")
+    duration_s = min(settings.duration_s, _LONGEST_LANDING_S)
+
+    def fuselage(time_s: FloatArray) -> FloatArray:
+        return fuselage_velocity_m_per_s(landing, time_s)
+
+    runs = [
+        RecordedResponse(
+            FROZEN, simulate_flight(flight, duration_s=duration_s, output_step_s=OUTPUT_STEP_S, gust=fuselage)
+        )
+    ]
+    advance(f"landing, {FROZEN}")
+    runs.append(tanks.flown(SLOSHING, flight, fuselage, duration_s=duration_s, output_step_s=OUTPUT_STEP_S))
+    advance(f"landing, {SLOSHING}")
     case = RecordedCase("landing", landing.speed_m_per_s, float("nan"), float("nan"), tuple(runs))
     readings = {}
     for name, reading in readings_of(case, landing.pulse_s).items():

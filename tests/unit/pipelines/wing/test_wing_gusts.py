@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pipelines.aircraft.response_file import RecordedResponse
 from pipelines.wing import gust_stages
 from pipelines.wing.results import SLOSHING, WingSettings
 
@@ -19,7 +20,7 @@ def test_both_liquids_fly_through_one_gust(
     """Frozen liquids would bear 2 m/s at 6 g; sloshing ones feel so many g for each m/s, at last too many."""
     flown: list[tuple[bool, float]] = []
 
-    def simulated(flight: Any, forces: Any, *, gust: Any, **settings: float) -> Any:
+    def simulated(flight: Any, forces: Any = None, *, gust: Any, **settings: float) -> Any:
         amplitude = float(gust(np.linspace(0.0, 1.0, 100_001)).max())
         flown.append((bool(forces), amplitude))
         felt = (g_per_m_per_s if forces else 3.0) * 9.80665 * amplitude
@@ -29,7 +30,11 @@ def test_both_liquids_fly_through_one_gust(
     monkeypatch.setattr(gust_stages, "flight_at", lambda *of: None)
     monkeypatch.setattr(gust_stages, "readings_of", lambda case, after_s: {})
     state: Any = SimpleNamespace(model=None, air=None)
-    tanks: Any = SimpleNamespace(forces=lambda: {"1": None}, departures=lambda response: ())
+    tanks: Any = SimpleNamespace(
+        flown=lambda name, flight, gust, **settings: RecordedResponse(
+            name, simulated(flight, {"1": None}, gust=gust, **settings)
+        )
+    )
     settings = WingSettings(gust_length_m=45.0)
     found = gust_stages.gust_case(state, tanks, settings, (321.0, 2.5), lambda note: None)
 
