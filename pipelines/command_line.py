@@ -33,6 +33,7 @@ _PLACES: Final = {
     "work": "analysis",
     "beam": "analysis",
     "ball": "analysis",
+    "ball-network": "analysis",
     "train": "models",
     "validate": "models",
     "study": "models",
