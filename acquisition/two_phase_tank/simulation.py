@@ -29,6 +29,9 @@ _REASONS = {
 }
 
 
+_REMEDY = "take other cells over the height, or a weaker motion"
+
+
 @dataclass(frozen=True)
 class FluidForces:
     """Forces of both fluids on the whole depth of the tank, means over every step.
@@ -170,7 +173,7 @@ class TwoPhaseTank:
         status = stepping.advance(self._flow, motion, self.setup.step_s, forces)
         if status != stepping.RUNNING:
             done = self._as_forces(forces[: self.n_steps - before])
-            raise InstabilityError(_REASONS[status], self.time_s, self._fastest_place(), done)
+            raise InstabilityError(_REASONS[status], self.time_s, self._fastest_place(), done, _REMEDY)
         return self._as_forces(forces)
 
     def step(self, vertical_m_per_s2: float, horizontal_m_per_s2: float = 0.0) -> tuple[float, float]:

@@ -193,13 +193,16 @@ def rows(results: dict[str, dict[str, Any]], cases: Sequence[Shaking]) -> list[s
         As in the file.
     cases : sequence of Shaking
     """
-    lines = ["| motion | cells | with | W̄ | β | advection | viscosity | blows | place | residual | s/s |"]
-    lines.append("|---|---|---|---|---|---|---|---|---|---|---|")
+    lines = [
+        "| motion | cells | with | W̄ | β | advection | viscosity | pressure |"
+        " interface | place | height | residual | s/s |"
+    ]
+    lines.append("|---|---|---|---|---|---|---|---|---|---|---|---|---|")
     for case in cases:
         if (found := results.get(case.name)) is None:
             continue
         shares = found["shares"]
-        given = [shares[name] for name in ("advection", "viscosity", "pressure", "place")]
+        given = [shares[name] for name in ("advection", "viscosity", "pressure", "interface", "place", "height")]
         given_text = " | ".join(f"{100 * share:.0f} %" for share in given)
         lines.append(
             f"| {case.acceleration_g:g} g, {case.frequency_hz:g} Hz | {case.cells_per_height} | {case.differs} |"

@@ -1,4 +1,4 @@
-"""`sloshlab virtual --liquid two_phase`: what has no such liquid is refused in one line, and nothing is made."""
+"""`sloshlab virtual --liquid two_phase`: what has no such liquid is refused in one line, nothing is made."""
 
 from pathlib import Path
 from typing import Any
