@@ -202,8 +202,11 @@ def rows(results: dict[str, dict[str, Any]], cases: Sequence[Shaking]) -> list[s
         if (found := results.get(case.name)) is None:
             continue
         shares = found["shares"]
-        given = [shares[name] for name in ("advection", "viscosity", "pressure", "interface", "place", "height")]
-        given_text = " | ".join(f"{100 * share:.0f} %" for share in given)
+        given = [
+            shares.get(name) for name in ("advection", "viscosity", "pressure", "interface", "place", "height")
+        ]
+        # results that were kept before a term was counted have it in the residual
+        given_text = " | ".join("–" if share is None else f"{100 * share:.0f} %" for share in given)
         lines.append(
             f"| {case.acceleration_g:g} g, {case.frequency_hz:g} Hz | {case.cells_per_height} | {case.differs} |"
             f" {found['w_bar']:.2f} ± {found['w_bar_scatter'] / math.sqrt(case.n_cycles // 2):.2f} |"
