@@ -170,6 +170,6 @@ def test_motion_that_is_none_is_refused(motion: object) -> None:
 
 def test_instability_keeps_what_was_computed() -> None:
     tank = TwoPhaseTank(SETUP)
-    with pytest.raises(InstabilityError, match="so fast.*other cells") as caught:
+    with pytest.raises(InstabilityError, match=r"so fast.*other cells") as caught:
         tank.advance([0.0, 1e12, 0.0])
     assert caught.value.valid.vertical_n.size == tank.n_steps
