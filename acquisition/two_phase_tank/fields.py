@@ -62,8 +62,6 @@ class Constants(NamedTuple):
         Largest sum of the volumes that leave a cell in a step, over its volume.
     tolerance : float
         Root mean square of the volume that a step may make in a cell, over its volume.
-    n_most : float
-        Most iterations for the pressure.
     """
 
     dx: float
@@ -82,7 +80,6 @@ class Constants(NamedTuple):
     cot_receding: float
     courant: float
     tolerance: float
-    n_most: float
 
 
 class Work(NamedTuple):

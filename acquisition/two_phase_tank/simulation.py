@@ -296,7 +296,6 @@ def constants_of(setup: TwoPhaseSetup) -> Constants:
         1 / math.tan(math.radians(walls.receding_angle_deg)),
         numerics.courant_number,
         numerics.tolerance,
-        float(numerics.most_iterations),
     )
 
 
