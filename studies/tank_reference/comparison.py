@@ -135,25 +135,29 @@ def results_at_points(liquid: Liquid) -> Results:
     return Results(xr.Dataset({name: ("window", values) for name, values in columns.items()}))
 
 
-def point_table(liquids: Mapping[str, Liquid]) -> Iterator[str]:
-    """Yield the lines of a Markdown table: W̄ and β of every liquid at every point.
+def point_table(liquids: Mapping[str, Liquid], quantity: str) -> Iterator[str]:
+    """Yield the lines of a Markdown table: W̄ or β of every liquid at every point.
 
     Parameters
     ----------
     liquids : mapping
         By their names, in the order of columns.
+    quantity : {"w_bar", "beta"}
     """
-    names = list(liquids)
-    yield "| point | ω̄ | ū | W̄: laboratory | " + " | ".join(names) + " | β: " + " | ".join(names) + " |"
-    yield "|" + "---|" * (4 + 2 * len(names))
+    is_work = quantity == "w_bar"
+    head = ["point", "ω̄", "ū", "W̄: laboratory" if is_work else "β: laboratory", *liquids]
+    yield "| " + " | ".join(head) + " |"
+    yield "|" + "---|" * len(head)
     for point in POINTS:
-        values = [liquids[name].get(point) for name in names]
-        measured = laboratory_w_bar(point)
+        values = [liquid.get(point) for liquid in liquids.values()]
         cells = [point.label, f"{point.omega_bar:.2f}", f"{point.u_bar:.3f}"]
-        cells.append("–" if math.isnan(measured) else "≈ 0" if measured == 0 else f"{measured:g}")
-        cells += ["–" if value is None else str(value.w_bar) for value in values]
-        cells += ["–" if value is None else str(value.beta) for value in values]
+        cells.append(_measured(laboratory_w_bar(point)) if is_work else "< 0")
+        cells += ["–" if value is None else str(getattr(value, quantity)) for value in values]
         yield "| " + " | ".join(cells) + " |"
+
+
+def _measured(w_bar: float) -> str:
+    return "–" if math.isnan(w_bar) else "≈ 0" if w_bar == 0 else f"{w_bar:g}"
 
 
 def account_table(results: Mapping[InterfoamCase, KeptResult]) -> Iterator[str]:
@@ -190,26 +194,24 @@ def _account_row(point: DrivenPoint, result: KeptResult) -> str:
     )
 
 
-def change_table(results: Mapping[InterfoamCase, KeptResult]) -> Iterator[str]:
-    """Yield the lines of a Markdown table: W̄ and β with every change, alone and in pairs.
+def change_table(results: Mapping[InterfoamCase, KeptResult], quantity: str) -> Iterator[str]:
+    """Yield the lines of a Markdown table: W̄ or β with every change, alone and in pairs.
 
     Parameters
     ----------
     results : mapping
+    quantity : {"w_bar", "beta"}
     """
     computed = [point for point in VARIED_POINTS if changed_case(point) in results]
-    yield "| reference with | " + " | ".join(f"{point.label}: W̄, β" for point in computed) + " |"
+    name_of = {"w_bar": "W̄", "beta": "β"}[quantity]
+    yield (
+        f"| {name_of} of `interFoam`, h/{REFERENCE_CELLS}, with | "
+        + " | ".join(point.label for point in computed)
+        + " |"
+    )
     yield "|" + "---|" * (1 + len(computed))
     for names in ((), *((name,) for name in CHANGES), *PAIRS):
         found = [results.get(changed_case(point, *names)) for point in computed]
-        if not any(found):
-            continue
-        cells = [_both(result) for result in found]
-        yield f"| {', '.join(names) or 'everything'} | " + " | ".join(cells) + " |"
-
-
-def _both(result: KeptResult | None) -> str:
-    if result is None:
-        return "–"
-    values = values_of(result)
-    return f"{values.w_bar}, {values.beta}"
+        if any(found):
+            cells = ["–" if result is None else str(result.counted(quantity)) for result in found]
+            yield f"| {', '.join(names) or 'everything'} | " + " | ".join(cells) + " |"

@@ -137,6 +137,8 @@ def misfit_table(liquids: Mapping[str, Liquid]) -> Iterator[str]:
     yield "| liquid | misfit where it may choose | misfit where it is judged |"
     yield "|---|---|---|"
     for name, liquid in liquids.items():
+        if math.isnan(misfit(liquid, CHOOSING).value) and math.isnan(misfit(liquid, JUDGING).value):
+            continue
         yield f"| {name} | {misfit(liquid, CHOOSING)} | {misfit(liquid, JUDGING)} |"
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 from studies.measured_facts.laboratory import FACTS
@@ -35,8 +36,10 @@ from studies.tank_reference.second_liquid import second_liquid
 
 PRESENT: Final = "present tank"
 ALGEBRAIC: Final = "interFoam"
-REFERENCE: Final = "reference"
 SECOND: Final = "second liquid"
+_HALVES: Final = ("chooses", "judges")
+_FACT_CHARACTERS, _PUBLISHED_CHARACTERS, _FIRST_CHARACTERS, _OTHER_CHARACTERS = 29, 17, 26, 14
+"""Of cells of the tables of facts, so that no row is longer than 120 characters."""
 _MARK: Final = {True: "yes", False: "**no**", None: "–"}
 
 
@@ -56,7 +59,6 @@ def shown_liquids(
         ALGEBRAIC: interfoam_liquid(interfoam),
     }
     liquids[SECOND] = second_liquid()
-    liquids |= {f"{ALGEBRAIC}, h/{cells}": interfoam_liquid(interfoam, cells) for cells in FINER_CELLS}
     return {name: liquid for name, liquid in liquids.items() if liquid}
 
 
@@ -89,34 +91,38 @@ def changes_of_present(
     interfoam, particles : mapping
         Kept results.
     """
-    return {
-        f"sound of {STIFF_M_PER_S:g} m/s": particle_liquid(particles, STIFF_M_PER_S),
-        "gas, surface tension and walls that hold": interfoam_liquid(interfoam),
-    }
+    liquids: dict[str, Liquid] = {f"sound of {STIFF_M_PER_S:g} m/s": particle_liquid(particles, STIFF_M_PER_S)}
+    for name, liquid in shown_liquids(interfoam, particles).items():
+        if name != PRESENT:
+            liquids[f"{name} in its place"] = liquid
+    return liquids
 
 
-def fact_table(present: Results | None, liquids: Mapping[str, Liquid]) -> Iterator[str]:
-    """Yield the lines of a Markdown table: fact, laboratory, the present tank's campaign, liquids of points.
+def fact_table(half: str, columns: Mapping[str, Results]) -> Iterator[str]:
+    """Yield the lines of a Markdown table: the facts of one half, the laboratory, and what liquids say.
 
     Parameters
     ----------
-    present : Results or None
-        Of the campaign; without, its column is left out.
-    liquids : mapping
-        By their names.
+    half : {"chooses", "judges"}
+    columns : mapping
+        Liquids by their names.
     """
-    columns: dict[str, dict[str, Fact]] = {}
-    if present is not None:
-        columns[f"{PRESENT}, campaign"] = _by_name(present)
-    columns |= {f"{name}, points": _by_name(results_at_points(liquid)) for name, liquid in liquids.items()}
-    yield "| fact | half | laboratory | " + " | ".join(columns) + " |"
-    yield "|" + "---|" * (3 + len(columns))
+    found = {name: _by_name(results) for name, results in columns.items()}
+    yield f"| fact that {half} | laboratory | " + " | ".join(found) + " |"
+    yield "|" + "---|" * (2 + len(found))
+    widths = (_FACT_CHARACTERS, _PUBLISHED_CHARACTERS, _FIRST_CHARACTERS, *[_OTHER_CHARACTERS] * (len(found) - 1))
     for name, fact in FACTS.items():
-        cells = [_said(found[name]) for found in columns.values()]
-        yield f"| {fact.what} | {fact.half} | {fact.published} | " + " | ".join(cells) + " |"
-    for half in ("chooses", "judges"):
-        counts = [_count(found, half) for found in columns.values()]
-        yield f"| **met of those computed** | {half} |  | " + " | ".join(counts) + " |"
+        if fact.half == half:
+            yield from _wrapped((fact.what, fact.published, *(_said(of[name]) for of in found.values())), widths)
+    yield "| met |  | " + " | ".join(_count(of, half) for of in found.values()) + " |"
+
+
+def _wrapped(cells: Sequence[str], widths: Sequence[int]) -> Iterator[str]:
+    """A row whose long cells go on in the rows below, which begin with an ellipsis."""
+    columns = [textwrap.wrap(cell, width) or [""] for cell, width in zip(cells, widths, strict=True)]
+    for k in range(max(map(len, columns))):
+        row = [column[k] if k < len(column) else "" for column in columns]
+        yield "| " + " | ".join([("… " if k else "") + row[0], *row[1:]]) + " |"
 
 
 def _by_name(results: Results) -> dict[str, Fact]:
@@ -148,24 +154,32 @@ def tables(
     """
     shown = shown_liquids(interfoam, particles)
     of_reference, of_present = changes_of_reference(interfoam), changes_of_present(interfoam, particles)
-    yield from point_table(shown)
-    yield ""
+    for quantity in ("w_bar", "beta"):
+        yield from point_table(shown, quantity)
+        yield ""
     yield from account_table(interfoam)
     yield ""
-    yield from change_table(interfoam)
-    yield ""
-    named = {f"{REFERENCE}, {name}": liquid for name, liquid in of_reference.items()}
-    named |= {f"{PRESENT}, {name}": liquid for name, liquid in of_present.items()}
+    for quantity in ("w_bar", "beta"):
+        yield from change_table(interfoam, quantity)
+        yield ""
+    named: dict[str, Liquid] = {
+        f"{PRESENT}, sound of {STIFF_M_PER_S:g} m/s": particle_liquid(particles, STIFF_M_PER_S)
+    }
+    named |= {f"{ALGEBRAIC}, {name}": liquid for name, liquid in of_reference.items()}
     yield from misfit_table(shown | named)
     yield ""
     yield from verdict_table(
         {
             PRESENT: verdict(particle_liquid(particles), of_present),
-            REFERENCE: verdict(interfoam_liquid(interfoam), of_reference),
+            ALGEBRAIC: verdict(interfoam_liquid(interfoam), of_reference),
         }
     )
     yield ""
-    yield from fact_table(present, {name: liquid for name, liquid in shown.items() if name.count("/") < 2})
+    columns = {name: results_at_points(liquid) for name, liquid in shown.items() if name != ALGEBRAIC}
     if present is not None:
+        columns[PRESENT] = present
+    for half in _HALVES:
+        yield from fact_table(half, columns)
         yield ""
+    if present is not None:
         yield from balance_table(shifted_balance(present))

@@ -94,8 +94,9 @@ def planned_cases() -> list[InterfoamCase]:
     strong_first = sorted(points, key=lambda point: point.acceleration_g <= _WEAK_G)
     cases = [case_at(point, REFERENCE_CELLS) for point in (_STRONGEST, *strong_first)]
     cases += [case_at(_STRONGEST, cells) for cells in FINER_CELLS]
-    cases += [case_at(point, REFERENCE_CELLS, solver=GEOMETRIC) for point in points]
+    cases.append(case_at(VARIED_POINTS[3], REFERENCE_CELLS, solver=GEOMETRIC))
     cases += [changed_case(point, name) for point in VARIED_POINTS[:3] for name in MAIN_CHANGES]
+    cases += [case_at(point, REFERENCE_CELLS, solver=GEOMETRIC) for point in points]
     cases.append(case_at(_STRONGEST, FINER_CELLS[0], solver=GEOMETRIC))
     cases += [changed_case(_STRONGEST, *pair) for pair in PAIRS]
     cases += [changed_case(point, name) for point in VARIED_POINTS for name in CHANGES]

@@ -199,10 +199,10 @@ def test_both_ways_to_the_work_agree_in_kept_results() -> None:
 def test_tables_have_a_line_for_every_point() -> None:
     results = read_results()
     liquids = {"reference": interfoam_liquid(results), "none": {}}
-    lines = list(point_table(liquids))
+    lines = list(point_table(liquids, "w_bar"))
     assert len(lines) == 2 + len(COMMON_POINTS) + 1
     assert len({line.count("|") for line in lines}) == 1
-    assert any(line.startswith("| everything |") for line in change_table(results))
+    assert any(line.startswith("| everything |") for line in change_table(results, "beta"))
     windows = results_at_points(liquids["reference"]).windows
     assert windows.sizes["window"] == len(liquids["reference"])
     # W = W̄ m_l (a₀/Ω)²
