@@ -125,8 +125,19 @@ def test_report_and_figures_are_complete(results: Path) -> None:
         "sensor_signals", "modal_accelerations", "release_transient", "damping_over_amplitude",
         "frequency_over_amplitude", "damping_of_repeats", "frequency_of_repeats", "damping_of_higher_modes",
         "random_signals", "excitation", "densities", "frequency_responses", "damping_over_rms",
+        "amplitude_and_phase", "work_of_cycle",
     }  # fmt: skip
-    for text in ("Fig. 2.32", "Fig. 2.34", "2.36", "Fig. 2.38", "Fig. 2.39", "Fig. 2.41", "Table 2.5"):
+    for text in (
+        "Fig. A.1",
+        "Fig. A.2",
+        "Fig. 2.32",
+        "Fig. 2.34",
+        "2.36",
+        "Fig. 2.38",
+        "Fig. 2.39",
+        "Fig. 2.41",
+        "Table 2.5",
+    ):
         assert text in page
     assert "Not drawn" not in page
     assert "http" not in page.replace("https://doi.org", "").replace("http-equiv=", "")

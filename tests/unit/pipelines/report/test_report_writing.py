@@ -25,7 +25,7 @@ Drawn = Callable[[str], tuple[SweepExperiment, Path]]
 
 OF_A_RIG = {
     "w_bar_map", "beta_map", "displacement_paths", "acceleration_paths", "time_histories", "hysteresis",
-    "work_bars", "surface", "work_map", "over_velocity", "uncertainty", "regimes", "harmonics",
+    "work_bars", "surface", "work_map", "over_velocity", "uncertainty", "viscous_map", "regimes", "harmonics",
 }  # fmt: skip
 OF_QUALITY = {"energy_identity", "phase_error", "sensor_agreement", "lost_data"}
 OF_WORK = {
