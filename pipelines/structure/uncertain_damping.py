@@ -93,7 +93,8 @@ def uncertainty_table(uncertain: NetworkUncertainty) -> Table:
             each.motion,
             text(100 * each.measured),
             text(100 * each.mean),
-            text(100 * each.std, 2),
+            text(100 * each.std, 2) if each.members.size > 1 else MISSING,
+            str(each.members.size),
             f"{text(100 * (each.mean - each.half_width))} … {text(100 * (each.mean + each.half_width))}"
             if np.isfinite(each.half_width)
             else MISSING,
@@ -113,6 +114,7 @@ def uncertainty_table(uncertain: NetworkUncertainty) -> Table:
         "ζ₁ measured [%]",
         "mean [%]",
         "standard deviation [%]",
+        "networks",
         "90 % interval [%]",
         "holds measured",
     )
