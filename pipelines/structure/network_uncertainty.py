@@ -7,6 +7,7 @@ recordings of the shaker do not tell. In the loop with the structure their diffe
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import json
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -22,6 +23,7 @@ from pipelines.structure.results import BeamExperiment, BeamSettings, in_g
 from pipelines.structure.twin_damping import decay_comparisons, fitted_damping
 from pipelines.structure.twins import twins_of_runs
 from pipelines.structure.uncertain_damping import NetworkUncertainty, UncertainDamping
+from sloshlab.errors import AnalysisError
 from sloshlab.modal.pooled_decays import DampingDeviation
 from sloshlab.recording import read_attributes
 from sloshlab.reduced_order_model.ensemble_storage import load_ensemble
@@ -58,10 +60,16 @@ def network_uncertainty(
             # what the members share of their training is kept once, with the ensemble
             save_model(dataclasses.replace(member, facts={**found.facts, **member.facts}), folder / f"{name}.nc")
             tables[name] = f'tank_model = "rom"\nparameters = {{rom = {json.dumps(f"{name}.nc")}}}'
-        made = twins_of_runs(sloshing, rig, folder, tables, with_known=False)
+        made, ran_away = list[Path](), list[str]()
+        for run, (name, table) in itertools.product(sloshing, tables.items()):
+            try:
+                made += twins_of_runs([run], rig, folder, {name: table}, with_known=False)
+            # one network that means nothing in a motion is a finding about the ensemble, not the end of it
+            except AnalysisError:
+                ran_away.append(f"{name} in {run.stem}")
         experiment = analyse_beam([*made, *sloshing], rig, settings)
     dampings = (*of_decays(decay_comparisons(experiment)), *of_random(experiment))
-    return NetworkUncertainty(ensemble.name, len(found.members), tuple(dampings))
+    return NetworkUncertainty(ensemble.name, len(found.members), tuple(dampings), tuple(ran_away))
 
 
 def of_decays(compared: Mapping[str, DampingDeviation]) -> list[UncertainDamping]:

@@ -67,11 +67,14 @@ class NetworkUncertainty:
         Of its file.
     n_members : int
     dampings : tuple of UncertainDamping
+    ran_away : tuple of str
+        Member and run of every simulation that ended because the network said what no training can have meant.
     """
 
     name: str
     n_members: int
     dampings: tuple[UncertainDamping, ...]
+    ran_away: tuple[str, ...] = ()
 
     def summary(self) -> dict[str, dict[str, float]]:
         """Numbers by motion, for a machine."""
@@ -108,6 +111,7 @@ def uncertainty_table(uncertain: NetworkUncertainty) -> Table:
         f"network more, trained as these were (Student); {held} of {len(rows)} measured values are in it. It "
         "tells what the runs of the training leave open, not what a network of this kind cannot say, nor how "
         "releases differ."
+        + (f" Ran away and left out: {', '.join(uncertain.ran_away)}." if uncertain.ran_away else "")
     )
     header = (
         "motion",

@@ -67,6 +67,9 @@ def analyse_beam_with_twins(
         if ensemble is not None:
             uncertain = network_uncertainty(ensemble, files, rig, settings)
             experiment = dataclasses.replace(
-                experiment, network_uncertainty=uncertain, inputs=(*experiment.inputs, ensemble)
+                experiment,
+                network_uncertainty=uncertain,
+                inputs=(*experiment.inputs, ensemble),
+                flags=(*experiment.flags, *(f"{ensemble.name}: {which} ran away" for which in uncertain.ran_away)),
             )
         return experiment, {path.name: path.read_bytes() for path in sorted(folder.iterdir())}

@@ -95,9 +95,9 @@ def centre_figure(found: Mapping[Shaking, Shaken]) -> bytes:
             left.plot(phase, run.centre_over_height, color=colour, label=f"{run.shaking.vertical_g:g} g")
         left.set(xlabel="cycles", ylabel="centre of the liquid, over h")
         for index, name in ((0, "β"), (1, "W̄")):
-            colour = DISTINCT_COLOURS[index]
-            right.plot(LEVELS_G, [run.by_force[index] for run in runs], color=colour, label=f"{name} by the force")
-            right.plot(LEVELS_G, [run.by_centre[index] for run in runs], "o", color=colour, mfc="white",
+            own = DISTINCT_COLOURS[index]
+            right.plot(LEVELS_G, [run.by_force[index] for run in runs], color=own, label=f"{name} by the force")
+            right.plot(LEVELS_G, [run.by_centre[index] for run in runs], "o", color=own, mfc="white",
                        label=f"{name} by the centre")  # fmt: skip
         right.axhline(0, color="#888888", lw=0.6)
         right.set(xlabel="acceleration [g]")

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from pipelines.structure import network_uncertainty as module
 from pipelines.structure.network_uncertainty import of_decays, of_random
+from pipelines.structure.results import BeamSettings
 from pipelines.structure.uncertain_damping import NetworkUncertainty, UncertainDamping, uncertainty_table
+from sloshlab.errors import AnalysisError
 from sloshlab.modal.pooled_decays import DampingDeviation
+from sloshlab.reduced_order_model.ensemble import PROBABILITIES, Ensemble, ResidualSpread
+from sloshlab.reduced_order_model.ensemble_storage import save_ensemble
+from sloshlab.reduced_order_model.model import ReducedOrderModel, Scaling
+from sloshlab.reduced_order_model.networks.radial_basis import NormalisedRadialBasis
+from sloshlab.reduced_order_model.regressors import Delays
 
 
 def test_half_width_is_students_for_one_network_more() -> None:
@@ -63,3 +72,41 @@ def test_random_runs_are_gathered_by_what_drove_them() -> None:
     (found,) = of_random(experiment)
     assert found.motion == "random, 0.2 g RMS"
     assert (found.measured, found.members.tolist()) == (0.022, [0.021, 0.025])
+
+
+def test_a_network_that_ran_away_is_named_in_the_table() -> None:
+    damping = UncertainDamping("random, 0.2 g RMS", 0.022, np.array([0.021, 0.023]))
+    table = uncertainty_table(NetworkUncertainty("e.nc", 3, (damping,), ("member_2 in random_0.2g",)))
+    assert table.caption.endswith("Ran away and left out: member_2 in random_0.2g.")
+    assert table.rows[0][4] == "2"
+
+
+def test_one_member_that_runs_away_does_not_end_the_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[str] = []
+
+    def simulated(runs: Any, rig: Any, folder: Any, tables: dict[str, str], *, with_known: bool) -> list[Path]:
+        (name,) = tables
+        if name == "member_2":
+            raise AnalysisError("twin", got="the output of the model runs away")
+        made.append(name)
+        return []
+
+    members = tuple(small_model(seed) for seed in (1, 2, 3))
+    ensemble = Ensemble(members, ResidualSpread(0.1, 0.1, (1.0,) * len(PROBABILITIES)))
+    save_ensemble(ensemble, tmp_path / "e.nc")
+    run: Any = SimpleNamespace(configuration="sloshing")
+    monkeypatch.setattr(module, "read_attributes", lambda path: run)
+    monkeypatch.setattr(module, "twins_of_runs", simulated)
+    monkeypatch.setattr(module, "analyse_beam", lambda *given: None)
+    monkeypatch.setattr(module, "decay_comparisons", lambda experiment: {})
+    monkeypatch.setattr(module, "of_random", lambda experiment: [])
+    found = module.network_uncertainty(tmp_path / "e.nc", [Path("decay.nc")], Path("rig.toml"), BeamSettings())
+    assert made == ["member_1", "member_3"]
+    assert found.ran_away == ("member_2 in decay",)
+
+
+def small_model(seed: int) -> ReducedOrderModel:
+    theta = np.random.default_rng(seed).normal(size=6)
+    return ReducedOrderModel(NormalisedRadialBasis(2, 2), theta, Delays.tapped(2), Scaling(), 128.0)
