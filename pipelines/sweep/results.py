@@ -32,7 +32,8 @@ class SweepOptions:
     windows: WindowSettings = field(default_factory=WindowSettings)
     boundaries: str = "measured"
     allow_incomplete: bool = False
-    has_report: bool = True  # keeps the signals of every window, which only a report shows
+    has_report: bool = field(default=True, kw_only=True)
+    """Keeps the signals of every window, which only a report shows."""
 
 
 @dataclass(frozen=True)

@@ -63,7 +63,7 @@ class ShakerSettings(SweepOptions):
         if boundaries not in ("measured", "law"):
             raise InputError("--boundaries", got=repr(boundaries), allowed="measured or law")
         windows = WindowSettings(half_width_cycles=p, spacing_cycles=m)
-        return cls(windows, boundaries, allow_incomplete, has_report)
+        return cls(windows, boundaries, allow_incomplete, has_report=has_report)
 
 
 @dataclass(frozen=True)

@@ -243,9 +243,9 @@ def filled_samples(values: FloatArray, rate_hz: float) -> BoolArray:
         return np.zeros(values.size, dtype=np.bool_)
     largest = maximum_filter1d(power, _QUIETEST_STRETCH)
     # nowhere near as quiet as the channel often is: a modulated motion has calm moments of its own
-    quiet = largest < _MADE_UP_SHARE**2 * float(np.quantile(largest, _OFTEN))
-    if not np.any(quiet):
-        return np.asarray(quiet, np.bool_)
+    quiet: BoolArray = largest < _MADE_UP_SHARE**2 * float(np.quantile(largest, _OFTEN))
+    if not quiet.any():
+        return quiet
     n = round(_NEIGHBOURHOOD_S * rate_hz)
     usual = uniform_filter1d(np.minimum(finite, 9 * typical), n)
     # and than the quieter side: before a motion starts and after it stops nothing is compared
