@@ -40,7 +40,8 @@ def viscous_map(name: str, rig: RigResult, runs: Sequence[RunResult]) -> ReportF
     draw_runs(axes, field.plane, runs)
     draw_iso_acceleration(axes, field.plane, iso_levels_g(runs))
     mark_maximum(axes, field)
-    largest, row = float(np.nanmax(field.values)), int(np.nanargmax(np.nanmax(field.values, axis=1)))
+    row, column = np.unravel_index(int(np.nanargmax(field.values)), field.values.shape)
+    largest = float(field.values[row, column])
     hertz = field.ordinate[row] * rig.rig.frequency_scale_rad_per_s / (2 * math.pi)
     caption = (
         f"Viscous damper that dissipates per cycle what the liquid dissipates, c = (m_l/π) √(g/h) ω̄ W̄ (E.4), for "

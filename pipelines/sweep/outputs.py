@@ -84,8 +84,10 @@ def provenance_of_sweeps(
     """What the results of an experiment rest on."""
     known: dict[Path | InMemory, str] = dict(known_sha256 or {})
     known.update({run.path: run.sha256 for run in experiment.runs})
+    # what is kept for a report alone changes no result, nor what identifies it
+    settings = dataclasses.replace(experiment.settings, has_report=True)
     return {
-        **provenance_of(command, experiment.inputs, known, settings=experiment.settings),
+        **provenance_of(command, experiment.inputs, known, settings=settings),
         "n_unsteady_windows": sum(int(run.windows.attrs["n_unsteady_windows"]) for run in experiment.runs),
     }
 

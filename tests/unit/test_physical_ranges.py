@@ -38,6 +38,7 @@ GUIDE: dict[str, dict[str, Any]] = {
         "stiffness_n_per_m": 3808.8,
         "coulomb_force_n": 0.37,
         "damping_kg_per_s": 1.58,
+        "spring_mass_kg": 0.84,
     },
 }
 FIELDS = [

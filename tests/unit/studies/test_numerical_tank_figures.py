@@ -269,7 +269,7 @@ def test_the_command_writes_the_maps(tmp_path: Path, rig: Rig, capsys: pytest.Ca
 @pytest.mark.parametrize(
     ("extra", "message"),
     [
-        (["portrait"], "picture: got portrait; allowed: snapshots, cycle, film, maps"),
+        (["portrait"], "picture: got portrait; allowed: snapshots, cycle, release, film, maps"),
         (["maps"], "maps: got no file"),
         (["maps", "--maps", "rig.toml"], "rig.toml: got"),
         (["maps", "--maps", "none.nc"], "none.nc: got"),
