@@ -468,6 +468,13 @@ def _check_time(time: np.ndarray, rate_hz: float, name: str) -> None:
             f"{name}: time", got=f"{time.size} samples", allowed="≥ 2 samples", remedy="record again"
         )
     step = 1.0 / rate_hz
+    if not np.isfinite(step * time.size):
+        raise RecordingError(
+            f"{name}: sampling_rate_hz",
+            got=f"{rate_hz:g} Hz",
+            allowed="a rate whose samples come within finite time",
+            remedy="state the rate of the time coordinate",
+        )
     worst = 0.0
     for start, chunk in _chunks(time):
         if not np.isfinite(chunk).all():

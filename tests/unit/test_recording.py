@@ -97,6 +97,12 @@ def test_any_start_is_uniform(start_s: float):
     validate_recording(run.assign_coords(time=("time", start_s + run.time.values, {"units": "s"})))
 
 
+@pytest.mark.parametrize("rate_hz", [2e-311, 1e-307, 1e-300, 1e308])
+def test_a_rate_at_the_ends_of_all_numbers_is_refused(rate_hz: float):
+    with pytest.raises(RecordingError, match=r"sampling_rate_hz: got"):
+        validate_recording(recording().assign_attrs(sampling_rate_hz=rate_hz))
+
+
 def test_memory_is_bounded_before_anything_is_read(tmp_path: Path):
     write_recording(recording(), tmp_path / "run.nc")
     with pytest.raises(RecordingError, match="1000 samples"):
