@@ -1,6 +1,6 @@
 """What a diagnosis of a flight test shows, in one picture: ``python -m studies.flight_test_figure [FOLDER]``.
 
-A wing with more lift than believed flies in the virtual laboratory and is diagnosed. Drawn are a gust passage that
+A wing with more lift than believed flies in the virtual laboratory and is diagnosed. Drawn are a flight that
 nothing was fitted to, before and after, and which block owns how much of the mismatch. Nothing in the picture is
 typed by hand.
 """
@@ -27,6 +27,7 @@ MODEL: Final = Path(__file__).resolve().parents[1] / "docs" / "examples" / "flig
 HIDDEN: Final = "lift_gain=0.2"
 _CHANNEL: Final = "acceleration_tip_rear"
 _SHOWN_S: Final = 1.5
+_FLIGHTS: Final = {"flight_gust": "a gust passage", "flight_pulse": "a pulse of the flap"}
 
 
 def flight_test_figure(diagnosis: Diagnosis) -> Figure:
@@ -37,7 +38,7 @@ def flight_test_figure(diagnosis: Diagnosis) -> Figure:
     diagnosis : Diagnosis
     """
     found = diagnosis.findings
-    run = next(run for run in found.split.held_out if run.attributes.experiment == "flight_gust")
+    run = found.split.held_out[0]
     best = diagnosis.verdict.model or found.retuned
     recorded = np.asarray(run.recording[_CHANNEL].values, np.float64)
     retuned, extended = (found.readings(model)[run.name][_CHANNEL] for model in (found.retuned, best))
@@ -54,7 +55,7 @@ def flight_test_figure(diagnosis: Diagnosis) -> Figure:
     # room for the legend above the peaks
     before.set_ylim(top=1.7 * float(recorded[part].max()))
     before.tick_params(labelbottom=False)
-    before.set_title("a gust passage that nothing was fitted to")
+    before.set_title(f"{_FLIGHTS.get(run.attributes.experiment, run.name)} that nothing was fitted to")
     after.set_xlabel("time [s]")
     _draw_blocks(figure.add_subplot(grid[:2, 1]), diagnosis)
     words = figure.add_subplot(grid[2, :])
