@@ -7,7 +7,7 @@ then within the inflated noise while the coarse motion is fitted.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -70,6 +70,7 @@ def fitted(
     stages: Sequence[float] = INFLATION_STAGES,
     known: BlockJacobian | None = None,
     is_last: bool = True,
+    hopeless_cost: Callable[[float], float] | None = None,
 ) -> tuple[FreeRunFit, BlockJacobian]:
     """Levenberg–Marquardt from one start; the baseline has priors.
 
@@ -87,6 +88,9 @@ def fitted(
         From nearby, to begin with (warm start); it is changed.
     is_last : bool
         Whether the fit may end only with a Jacobian that was computed where it ends.
+    hopeless_cost : callable, optional
+        Of a noise inflation: the cost from which a fit is of no use. It is abandoned where a step with a new
+        Jacobian gains so little that all steps that are left, each gaining as much, would leave it there.
 
     Returns
     -------
@@ -110,7 +114,10 @@ def fitted(
         return empty, BlockJacobian(theta.size, ())
     descent = _LevenbergMarquardt(problem, theta, residual, known)
     for inflation in stages:
-        descent.stage(inflation, n_iterations, tolerance, needs_fresh=is_last and inflation == stages[-1])
+        most = np.inf if hopeless_cost is None else hopeless_cost(inflation)
+        is_last_stage = is_last and inflation == stages[-1]
+        if not descent.stage(inflation, n_iterations, tolerance, needs_fresh=is_last_stage, hopeless_cost=most):
+            break
     return descent.fit(), descent.jacobian
 
 
@@ -125,13 +132,16 @@ class _LevenbergMarquardt:
         self.jacobian, self.hessian = known or BlockJacobian(n, ()), np.eye(n)
         self.inflation, self.inflation_weights = 0.0, np.ones(residual.size)
 
-    def stage(self, inflation: float, n_iterations: int, tolerance: float, *, needs_fresh: bool) -> None:
-        """Descend with inflated noise."""
+    def stage(
+        self, inflation: float, n_iterations: int, tolerance: float, *, needs_fresh: bool, hopeless_cost: float
+    ) -> bool:
+        """Descend with inflated noise; whether there is hope left."""
         self.inflation, self.inflation_weights = inflation, self.problem.inflation_weights(inflation)
         damping, is_fresh = 1e-3, False
         # The Jacobian of an earlier stage, or a warm start, serves until a step shows that it is wrong.
         is_wanted, worth = not self.jacobian.blocks, 0.0
-        for iteration in range(n_iterations if inflation > 0 else 2 * n_iterations):
+        most_iterations = n_iterations if inflation > 0 else 2 * n_iterations
+        for iteration in range(most_iterations):
             if is_wanted:
                 # Wide differences while the noise is inflated, fine ones for the optimum itself.
                 self.jacobian = self.problem.jacobian(
@@ -139,9 +149,14 @@ class _LevenbergMarquardt:
                 )
                 is_fresh = True
             least = tolerance * (1.0 if inflation > 0 else _LAST_STAGE_FACTOR)
+            before = self._cost() if is_wanted else np.inf
             gain, predicted, damping = self._step(damping, _LEAST_PREDICTED_SHARE * least)
             if is_fresh:
                 worth = gain / (self.theta.size + 1)
+            if is_wanted and (after := self._cost()) > hopeless_cost:
+                n_left = most_iterations - 1 - iteration
+                if after - n_left * (before - after) > hopeless_cost:
+                    return False
             is_done = gain < least and (iteration > 0 or gain <= 0)
             # A corrected Jacobian may point nowhere where the true one still does. The last stage therefore ends
             # only with one that was computed where the fit is, which also gives the covariance; so does any where
@@ -152,6 +167,11 @@ class _LevenbergMarquardt:
             # that brings less per simulation than the last new Jacobian did, that another one is worth its price.
             is_wanted = is_done or gain < max(_LEAST_GAIN_RATIO * predicted, worth)
             is_fresh = is_fresh and gain <= 0
+        return True
+
+    def _cost(self) -> float:
+        misfit = huber_cost(self.inflation_weights * self.residual)
+        return misfit + self.problem.prior_cost(self.theta, self.inflation)
 
     def _step(self, damping: float, least: float) -> tuple[float, float, float]:
         """One step; relative decrease of the cost, the decrease that the Jacobian predicts, and the next damping.

@@ -8,7 +8,7 @@ tempered posterior becomes, and from where the effect is to be fitted.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from math import isfinite, log
@@ -54,7 +54,9 @@ class HiddenEffect:
     gain: float
 
 
-def hidden_effects(runs: FittedRuns, fit: FreeRunFit, pool: Sequence[Candidate]) -> list[HiddenEffect]:
+def hidden_effects(
+    runs: FittedRuns, fit: FreeRunFit, pool: Sequence[Candidate], least: float = 0.0
+) -> list[HiddenEffect]:
     """Of every effect that shows by its size the best of its starts, the largest gain first.
 
     Starts are its own and those that the missing force shows, such as instants of pulses.
@@ -65,6 +67,8 @@ def hidden_effects(runs: FittedRuns, fit: FreeRunFit, pool: Sequence[Candidate])
     fit : FreeRunFit
         Which leaves nothing.
     pool : sequence of Candidate
+    least : float
+        Gain that is asked for.
     """
     problem = runs.problem_of(fit)
     about = _AboutFit(problem, problem.theta_of(fit.values))
@@ -74,32 +78,45 @@ def hidden_effects(runs: FittedRuns, fit: FreeRunFit, pool: Sequence[Candidate])
 
     def of_candidate(candidate: Candidate) -> HiddenEffect | None:
         extended = runs.problem((*fit.candidates, candidate))
-        starts = _directions(candidate, places)
-        thetas = [
-            extended.theta_of({**fit.values, **candidate.sized(start, size)})
-            for start in starts
-            for size in _SIZES
-        ]
         own = [i for i, name in enumerate(extended.names) if name.startswith(f"{candidate.key}.")]
-        spacings, found = places_in_runs(extended, candidate), []
+        spacings = places_in_runs(extended, candidate)
         ranges = {prior.name: prior.high - prior.low for prior in candidate.prior}
         chosen_among = sum(log(max(ranges[name] / spacing, 1.0)) for name, spacing in spacings.items())
-        moved = extended.residuals_moved(thetas, own, about.residual)
-        for start in starts:
-            of_sizes = list(islice(moved, len(_SIZES)))
-            if not all(np.isfinite(each).all() for each in of_sizes):
-                continue
-            one, two, three = of_sizes
-            # The slope at no size, but not from there: beside an effect on an accelerometer another one may drive.
-            change = (8 * two - 5 * one - 3 * three) / (2 * _SMALL)
-            if not change.any():
-                continue
-            low, high = _factors(candidate, start)
-            theta, factor, gain = about.with_effect(change, low, high)
-            if isfinite(gain):
-                values = {**problem.values(theta), **candidate.sized(start, factor)}
-                found.append(HiddenEffect(candidate, values, gain - chosen_among))
-        return max(found, key=lambda hidden: hidden.gain, default=None)
+
+        def moved(
+            starts: Sequence[dict[str, float]], sizes: Sequence[float]
+        ) -> Iterator[tuple[dict[str, float], list[FloatArray]]]:
+            thetas = [
+                extended.theta_of({**fit.values, **candidate.sized(start, size)})
+                for start in starts
+                for size in sizes
+            ]
+            residuals = extended.residuals_moved(thetas, own, about.residual)
+            for start in starts:
+                yield start, list(islice(residuals, len(sizes)))
+
+        def hidden(start: dict[str, float], change: FloatArray) -> HiddenEffect | None:
+            if not (np.isfinite(change).all() and change.any()):
+                return None
+            theta, factor, gain = about.with_effect(change, *_factors(candidate, start))
+            values = {**problem.values(theta), **candidate.sized(start, factor)}
+            return HiddenEffect(candidate, values, gain - chosen_among) if isfinite(gain) else None
+
+        def slope(one: FloatArray, two: FloatArray, three: FloatArray) -> FloatArray:
+            if not all(np.isfinite(each).all() for each in (one, two, three)):
+                return np.full(one.size, np.inf)
+            # At no size, but not from there: beside an effect on an accelerometer another one may drive.
+            return np.asarray((8 * two - 5 * one - 3 * three) / (2 * _SMALL))
+
+        starts = _directions(candidate, places)
+        if not (fit.candidates and candidate.effect.block == "sensor"):
+            # One size tells the slope well enough to see what is far from the gain that is asked for.
+            changes = ((start, (at - about.residual) / _SMALL) for start, [at] in moved(starts, _SIZES[:1]))
+            by_one = [(start, hidden(start, change)) for start, change in changes]
+            starts = [start for start, each in by_one if each is not None and each.gain > 0.5 * least]
+        slopes = (slope(*of_sizes) for _, of_sizes in moved(starts, _SIZES))
+        found = [hidden(start, change) for start, change in zip(starts, slopes, strict=True)]
+        return max((each for each in found if each is not None), key=lambda each: each.gain, default=None)
 
     each = runs.model.executor.map(of_candidate, missing_from(fit, pool))
     return sorted((hidden for hidden in each if hidden is not None), key=lambda hidden: -hidden.gain)

@@ -19,6 +19,7 @@ from sloshlab.diagnosis.inference.remainder import remainder
 from sloshlab.diagnosis.inference.run_noise import run_noise
 from sloshlab.diagnosis.inference.sampled_jumps import with_sampled_jumps
 from sloshlab.diagnosis.inference.scored_model import complexity, is_worth_a_word
+from sloshlab.diagnosis.inference.thresholds import LAW
 from sloshlab.diagnosis.inference.whitened import whitened
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
 from sloshlab.diagnosis.selection.hidden_effects import hidden_effects
@@ -223,7 +224,12 @@ class ModelSelection:
             (N_KEPT * 2 ** len(stages) // (1 if against is None else 2), N_KEPT),
             lambda name, i, n: self.said(f"{what}: {name}", i, n),
         )
-        self._keep(self.runs.model.executor.map(lambda fit: self._to_the_end(fit, bases[0]), coarse))
+        # The best one first: what is far behind it is not fitted to the end.
+        for some in (coarse[:1], coarse[1:]):
+            hopeless = self._hopeless_cost()
+            self._keep(
+                self.runs.model.executor.map(lambda fit: self._to_the_end(fit, bases[0], hopeless), some)  # noqa: B023
+            )
 
     def _has_budget(self) -> bool:
         if self._left <= 0:
@@ -235,7 +241,8 @@ class ModelSelection:
         self.said("hidden effects", 0, 1)
         n, pool = len(fit.candidates), len(self.pool)
         least = log_prior(n, pool) - log_prior(n + 1, pool)
-        hidden = [each for each in hidden_effects(self.runs, fit, self._pool_beside([fit])) if each.gain > least]
+        beside = hidden_effects(self.runs, fit, self._pool_beside([fit]), least)
+        hidden = [each for each in beside if each.gain > least]
         starts = [FreeRunFit((*fit.candidates, each.candidate), each.values, 0.0, 0.0) for each in hidden]
         is_more_probable = False
         # Those that promise most first; look-alikes of what keeps its promise after them.
@@ -318,11 +325,36 @@ class ModelSelection:
         stages = stages_for(self.runs.problem_of(base), base)
         return tuple(stages[min(k, len(stages) - 1)] for k in range(3))
 
-    def _to_the_end(self, coarse: FreeRunFit, base: FreeRunFit) -> FreeRunFit:
+    def _hopeless_cost(self) -> Callable[[float], float]:
+        """Cost on all runs by noise inflation, beyond which a fit cannot have the evidence of the best one.
+
+        Of what lacks where nothing is added a law may leave a tenth of the amplitude.
+        """
+        nothing, best = self.fits[frozenset()], min(self.fits.values(), key=lambda fit: fit.cost)
+        left = []
+        for fit in (nothing, best):
+            problem = self.runs.problem_of(fit)
+            theta = problem.theta_of(fit.values)
+            left.append((problem, theta, problem.residual(theta)))
+        chance = 2 * TEMPERING * (complexity(best) + NO_CHANCE)
+
+        def hopeless_cost(inflation: float) -> float:
+            of_nothing, of_best = (
+                huber_cost(problem.inflation_weights(inflation) * residual) + problem.prior_cost(theta, inflation)
+                for problem, theta, residual in left
+            )
+            allowed = of_best + chance + LAW**2 * max(of_nothing - of_best, 0.0)
+            return max(HOPELESS_COST_RATIO * of_best, allowed)
+
+        return hopeless_cost
+
+    def _to_the_end(
+        self, coarse: FreeRunFit, base: FreeRunFit, hopeless_cost: Callable[[float], float] | None = None
+    ) -> FreeRunFit:
         """A fit on all runs."""
         self.said(f"fitting {' + '.join(candidate.key for candidate in coarse.candidates)}", 0, 1)
         problem = self.runs.problem_of(coarse)
-        fit = _at_its_optimum(problem, {**base.values, **coarse.values})
+        fit = _at_its_optimum(problem, {**base.values, **coarse.values}, hopeless_cost)
         # What an effect has of its own in a run, such as an instant.
         own = {run_of(name, self.runs.model) for name in problem.names[problem.n_baseline :]}
         alone = [run for run in self.runs.runs if run[0].run.is_free or run[0].run.name in own]
@@ -333,7 +365,7 @@ class ModelSelection:
         values = values_of_runs(self.runs.model, alone, fit)
         if not problem.costs([values])[0] < fit.cost:
             return fit
-        other = _at_its_optimum(problem, values)
+        other = _at_its_optimum(problem, values, hopeless_cost)
         return other if other.cost < fit.cost else fit
 
     def _compensated(self, base: FreeRunFit, matched: tuple[Candidate, Mapping[str, float]]) -> FreeRunFit:
@@ -342,8 +374,9 @@ class ModelSelection:
         candidates = (*base.candidates, candidate)
         beside = FreeRunProblem(self.runs.model, self.runs.runs, candidates, numbers)
         start = {**base.values, **numbers}
-        held = _at_its_optimum(beside, beside.values(beside.theta_of(start)))
-        return held if held.trouble else self._to_the_end(held, base)
+        hopeless = self._hopeless_cost()
+        held = _at_its_optimum(beside, beside.values(beside.theta_of(start)), hopeless)
+        return held if held.trouble else self._to_the_end(held, base, hopeless)
 
     def _swapped(self, n: int) -> None:
         """Other effects in the place of each effect of the best model of so many, beside its baseline."""
@@ -435,13 +468,16 @@ def _keys_of(candidates: Iterable[Candidate]) -> frozenset[str]:
     return frozenset(candidate.key for candidate in candidates)
 
 
-def _at_its_optimum(problem: FreeRunProblem, start: Mapping[str, float]) -> FreeRunFit:
+def _at_its_optimum(
+    problem: FreeRunProblem, start: Mapping[str, float], hopeless_cost: Callable[[float], float] | None = None
+) -> FreeRunFit:
     """A fit through all stages of noise inflation in which the residuals of its start show.
 
     What stood in for an effect is off by as much when the effect is taken out, and the other way round.
     """
     here = FreeRunFit(problem.candidates, dict(start), 0.0, 0.0)
-    return fitted(problem, start, n_iterations=15, stages=stages_for(problem, here))[0]
+    stages = stages_for(problem, here)
+    return fitted(problem, start, n_iterations=15, stages=stages, hopeless_cost=hopeless_cost)[0]
 
 
 def _without(fit: FreeRunFit, effect: Candidate) -> FreeRunFit:
