@@ -28,6 +28,17 @@ def module_names() -> list[str]:
 MODULES = module_names()
 
 
+def rooms() -> dict[str, list[str]]:
+    """Modules by the package that holds them: what a test of its own costs is more than looking at one module."""
+    found: dict[str, list[str]] = {}
+    for name in MODULES:
+        found.setdefault(name.rpartition(".")[0] or name, []).append(name)
+    return found
+
+
+ROOMS = rooms()
+
+
 def public_objects(module: ModuleType) -> Iterator[tuple[str, Any]]:
     """Functions, classes and methods that are defined in a module and have public names."""
     for name, item in vars(module).items():
@@ -66,29 +77,41 @@ def parameters_of(item: Callable[..., Any]) -> list[str]:
     return [name for name in inspect.signature(function).parameters if name not in skipped]
 
 
-@pytest.mark.parametrize("name", MODULES)
-def test_everything_public_has_a_docstring(name: str) -> None:
-    module = importlib.import_module(name)
-    assert module.__doc__, f"{name} has no docstring"
-    missing = [which for which, item in public_objects(module) if not (item.__doc__ or "").strip()]
+@pytest.mark.parametrize("room", ROOMS)
+def test_everything_public_has_a_docstring(room: str) -> None:
+    modules = [importlib.import_module(name) for name in ROOMS[room]]
+    assert [module.__name__ for module in modules if not module.__doc__] == []
+    missing = [
+        f"{module.__name__}.{which}"
+        for module in modules
+        for which, item in public_objects(module)
+        if not (item.__doc__ or "").strip()
+    ]
     assert missing == []
 
 
-@pytest.mark.parametrize("name", MODULES)
-def test_documented_parameters_are_those_of_the_signature(name: str) -> None:
+@pytest.mark.parametrize("room", ROOMS)
+def test_documented_parameters_are_those_of_the_signature(room: str) -> None:
     wrong = {}
-    for which, item in public_objects(importlib.import_module(name)):
-        text = section(inspect.cleandoc(item.__doc__ or ""), "Parameters")
-        if text is None or (inspect.isclass(item) and item.__init__ is object.__init__):
-            continue
-        documented, real = documented_parameters(text), set(parameters_of(item))
-        if documented != real:
-            wrong[which] = (sorted(documented - real), sorted(real - documented))
+    for name in ROOMS[room]:
+        for which, item in public_objects(importlib.import_module(name)):
+            text = section(inspect.cleandoc(item.__doc__ or ""), "Parameters")
+            if text is None or (inspect.isclass(item) and item.__init__ is object.__init__):
+                continue
+            documented, real = documented_parameters(text), set(parameters_of(item))
+            if documented != real:
+                wrong[f"{name}.{which}"] = (sorted(documented - real), sorted(real - documented))
     assert wrong == {}, f"(documented but not there, there but not documented): {wrong}"
 
 
-@pytest.mark.parametrize("name", MODULES)
-def test_examples_run(name: str) -> None:
+@pytest.mark.parametrize("room", ROOMS)
+def test_examples_run(room: str) -> None:
+    failed = {name: n for name in ROOMS[room] if (n := n_failed_examples(name))}
+    assert failed == {}
+
+
+def n_failed_examples(name: str) -> int:
+    """How many examples of a module go wrong; each is printed."""
     module = importlib.import_module(name)
     finder = doctest.DocTestFinder(exclude_empty=True)
     runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS)
@@ -99,7 +122,7 @@ def test_examples_run(name: str) -> None:
         if not inspect.isclass(item) and "." not in which and not inspect.isfunction(vars(module)[which]):
             for test in finder.find(item, f"{name}.{which}", module=False, globs=vars(module).copy()):
                 runner.run(test)
-    assert runner.summarize(verbose=False).failed == 0
+    return int(runner.summarize(verbose=False).failed)
 
 
 def test_the_checks_see_what_they_look_for() -> None:
