@@ -21,9 +21,12 @@ SCALING_ROM := $(RESULTS)/tank_scaling/ROM_60x20.nc
 BALLS :=
 BALL := $(RESULTS)/bouncing_ball/decay_contact/ball.toml
 PATIENCE ?= 30
+REPLAYED ?= raw_data/shaker
 FUZZ_SECONDS ?= 600
 # one more than cores: tests of devices wait for a clock most of their time
 TEST_WORKERS ?= 3
+# a file by one worker, in the order of tests/measured_times.csv
+PYTEST = $(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder
 BENCH ?=
 VERSION = $(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' sloshlab/_version.py)
 DOCS_BRANCH ?= gh-pages
@@ -32,7 +35,7 @@ DOCS_BRANCH ?= gh-pages
 export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks aircraft wing rom-study closed-loop replay campaign tank-campaign tank-scaling pictures tank-diagnosis trial flight-trial rivals test test-newest test-all lint format type bench bench-history fuzz soak wheel docs docs-publish clean tank-reference ball-network fill-level
+.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks aircraft wing rom-study closed-loop replay campaign tank-campaign tank-scaling pictures tank-diagnosis trial flight-trial rivals test test-times test-newest test-all lint format type bench bench-history fuzz soak wheel docs docs-publish clean tank-reference ball-network fill-level
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -104,8 +107,8 @@ wing: setup  ## the wing with eight tanks, with the model of `make rom` and maps
 rom-study: setup  ## the sensitivity study of reduced-order models (up to an hour; goes on where it was stopped)
 	$(BIN)/python -m pipelines.experiments study raw_data/numerical_tank/shaker $(RESULTS)/rom_study
 
-replay: setup  ## every recording of raw_data/shaker through simulated serial and CAN devices (PATIENCE=s for an answer)
-	$(BIN)/python -m pipelines.experiments replay raw_data/shaker $(RESULTS)/replay --patience $(PATIENCE)
+replay: setup  ## every recording of raw_data/shaker (or REPLAYED=folder) through simulated serial and CAN devices (PATIENCE=s for an answer)
+	$(BIN)/python -m pipelines.experiments replay $(REPLAYED) $(RESULTS)/replay --patience $(PATIENCE)
 
 campaign: setup  ## make the recordings of raw_data/shaker again
 	$(BIN)/sloshlab virtual campaign -o raw_data/shaker
@@ -159,14 +162,17 @@ rivals: setup  ## other ways to answer the cases of `make trial`, marked alike; 
 	  -o $(RESULTS)/rivals
 
 test: setup  ## the tests, at most 10 minutes on 2 cores
-	$(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadfile -m "not slow"
+	$(PYTEST) -m "not slow"
+
+test-times: setup  ## the tests, and what each file of them costs into tests/measured_times.csv
+	$(PYTEST) -m "not slow" -p tests.measured_times
 
 test-newest:  ## the tests with the newest dependencies, in an environment of their own
 	rm -rf .venv-newest
 	$(MAKE) test VENV=.venv-newest LOCK=
 
 test-all: setup  ## all tests
-	$(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadfile
+	$(PYTEST)
 
 lint: setup  ## style and the direction of imports
 	$(BIN)/ruff check .

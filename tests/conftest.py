@@ -5,10 +5,14 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from tests.compiled_once import compile_once
+from tests.measured_times import sort_by_time
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 
@@ -18,6 +22,19 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
     # started by nohup; programs under test would rightly outlive their terminal, too
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Workers compile each loop once for all of them."""
+    if hasattr(config, "workerinput"):
+        compile_once(Path(tempfile.gettempdir(), f"sloshlab-compiling-{config.workerinput['testrunuid']}"))
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Workers take the longest files first."""
+    if hasattr(config, "workerinput"):
+        sort_by_time(items)
 
 
 @pytest.fixture(autouse=True)
