@@ -6,7 +6,7 @@ Each channel is compared with its own signal on both sides, so that nothing need
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -18,18 +18,20 @@ from sloshlab.conditioning.clipping import clipped_samples, clipping
 from sloshlab.conditioning.gaps import run_bounds, sampling_step_s
 from sloshlab.conditioning.quality import LARGEST_CLIPPED_FRACTION
 from sloshlab.consistency.finding import Action, BoolArray, Finding
+from sloshlab.consistency.sample_scan import (
+    PREDICTION_ERROR,
+    QUIETEST_STRETCH,
+    SHORTEST_HOLD,
+    ScannedChannel,
+    prediction_error,
+    widened,
+)
 from sloshlab.recording import channels
 
 FloatArray = npt.NDArray[np.float64]
 
-_NEIGHBOURHOOD_S = 1.0
-"""To each side of a stretch, what its signal is compared with."""
 _HOLD_MARGIN = 3.0
 """A sine holds one step of its converter at its crest; three times as long it cannot."""
-_SHORTEST_HOLD = 12
-"""Random motion of several modes stands still for half as long by chance, once in some minutes."""
-_QUIETEST_STRETCH = 24
-"""Samples over which the noise of a channel must vanish before it is called made up."""
 _MADE_UP_SHARE = 0.02
 """Of the noise of the neighbourhood; what is computed from few points has none."""
 _BEYOND_STEPS = 0.3
@@ -43,7 +45,6 @@ _REPEATED_SHARE = 0.3
 _REPEATED_STEPS = 8
 _SMALLEST_SPIKE = 0.5
 """Of the RMS of a channel: a smaller one changes the work of a cycle of n samples by 1/n of the reactive power."""
-_LARGEST_STANDARDISED = 1e6
 _ROUNDING = 1e-9
 _BEND: Final = np.array([1.0, -2.0, 1.0])
 _FELT_SIGMA = 5.0
@@ -58,20 +59,7 @@ SAMPLE_CHECKS: Final = {
     "repeated samples": "each value stands several times: sampled slower than stated",
 }
 """What is examined, and what a finding means."""
-# The error of the cubic through four neighbours, as a filter of the samples.
-_PREDICTION_ERROR: Final = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / 6.0
-WHITE_GAIN: Final = float(np.sqrt((_PREDICTION_ERROR**2).sum()))
-
-
-def prediction_error(values: FloatArray) -> FloatArray:
-    """Each sample minus the cubic through its four neighbours, shape (n,); zero at the two ends.
-
-    For white noise its standard deviation is 1.394 times that of the noise; a sine of n samples per period leaves
-    (2π/n)⁴/6 of its amplitude.
-    """
-    error = np.zeros_like(values)
-    error[2:-2] = np.convolve(values, _PREDICTION_ERROR, mode="valid")
-    return error
+WHITE_GAIN: Final = float(np.sqrt((PREDICTION_ERROR**2).sum()))
 
 
 def examined_samples(
@@ -97,42 +85,44 @@ def examined_samples(
     """
     findings: list[Finding] = []
     wrong: dict[str, BoolArray] = {}
-    if recording.sizes["time"] < 8 * _QUIETEST_STRETCH:
+    if recording.sizes["time"] < 8 * QUIETEST_STRETCH:
         return findings, wrong
     rate_hz = 1.0 / sampling_step_s(recording)
-    over_largest = {name: _over_its_largest(recording[name]) for name in channels(recording)}
-    signals = {name: values for name, values in over_largest.items() if values is not None}
-    errors = {name: standardised_errors(values, rate_hz) for name, values in signals.items()}
+    # every check is one of proportions
+    largest = {name: _largest_finite(recording[name].values) for name in channels(recording)}
+    scanned = {name: ScannedChannel(recording[name].values, rate_hz, at) for name, at in largest.items() if at > 0}
     time = recording["time"].values
-    for name in signals if names is None else [name for name in names if name in signals]:
-        # a blow is felt by more than one sensor, a disturbed sample by one
-        spiked = spikes(errors[name])
-        if spiked.any():
-            spiked &= ~_felt_elsewhere(name, errors)
-            spiked &= np.abs(prediction_error(signals[name])) > _SMALLEST_SPIKE * np.nanstd(signals[name])
-        of_check = {
-            "cut off": _cut_off(recording[name]),
-            "held samples": held_samples(signals[name], rate_hz),
-            "filled samples": filled_samples(signals[name], rate_hz),
-            "spikes": _widened(spiked, 3),
-            "repeated samples": repeated_samples(signals[name]),
-        }
-        explained = np.zeros(time.size, dtype=np.bool_)
-        for check, suspicious in of_check.items():
+    for name in scanned if names is None else [name for name in names if name in scanned]:
+        explained: BoolArray | None = None
+        for check, suspicious in _suspicious(recording[name], scanned):
+            if not suspicious.any():
+                continue
             # a flat top does not change, what does not change has no noise either, and steps at both ends
-            samples = suspicious & ~_widened(explained, 9)
-            explained |= samples
+            samples = suspicious if explained is None else suspicious & ~widened(explained, 9)
+            explained = samples if explained is None else explained | samples
             if check in checks and samples.any():
                 findings.append(_found(check, name, samples, time))
-                wrong[name] = wrong.get(name, np.zeros(samples.size, dtype=np.bool_)) | samples
+                wrong[name] = wrong[name] | samples if name in wrong else samples
     return findings, wrong
 
 
-def _over_its_largest(channel: xr.DataArray) -> FloatArray | None:
-    """Values over the largest of them, as every check is one of proportions; None where nothing was measured."""
-    values = np.asarray(channel.values, dtype=np.float64)
-    largest = float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
-    return values / largest if largest > 0 else None
+def _suspicious(channel: xr.DataArray, scanned: Mapping[str, ScannedChannel]) -> Iterator[tuple[str, BoolArray]]:
+    """Every check with the samples that it finds wrong."""
+    own = scanned[str(channel.name)]
+    yield "cut off", _cut_off(channel)
+    yield "held samples", held_samples(own)
+    yield "filled samples", filled_samples(own)
+    yield "spikes", widened(_own_spikes(str(channel.name), scanned), 3)
+    yield "repeated samples", repeated_samples(own)
+
+
+def _largest_finite(values: npt.NDArray[np.floating]) -> float:
+    """Magnitude of the largest value that is a number, 0 if none is."""
+    # NaN loses against any number, and nothing is copied
+    largest = float(np.fmax(np.fmax.reduce(values), -np.fmin.reduce(values)))
+    if math.isfinite(largest):
+        return largest
+    return float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
 
 
 def _found(check: str, name: str, samples: BoolArray, time: FloatArray) -> Finding:
@@ -144,21 +134,26 @@ def _found(check: str, name: str, samples: BoolArray, time: FloatArray) -> Findi
     return Finding(check, (name,), text, action, float(time[at[0]]), float(time[at[-1]]))
 
 
-def _felt_elsewhere(name: str, errors: Mapping[str, FloatArray]) -> BoolArray:
-    others = [np.abs(error) > _FELT_SIGMA for other, error in errors.items() if other != name]
-    return _widened(np.logical_or.reduce(others), 5) if others else np.zeros(errors[name].size, dtype=np.bool_)
-
-
-def _widened(mask: BoolArray, n: int) -> BoolArray:
-    """True where any of n samples about each is, the one more of an even n being before it."""
-    wide = mask.copy()
-    # most masks of most runs are empty
-    if mask.any():
-        for k in range(1, n // 2 + 1):
-            wide[k:] |= mask[:-k]
-        for k in range(1, n - n // 2):
-            wide[:-k] |= mask[k:]
-    return wide
+def _own_spikes(name: str, scanned: Mapping[str, ScannedChannel]) -> BoolArray:
+    """True at spikes of a channel that are large and that no other channel feels."""
+    own = scanned[name]
+    spiked = spikes(own)
+    at = np.flatnonzero(spiked)
+    if not at.size:
+        return spiked
+    smallest = _SMALLEST_SPIKE * float(np.nanstd(own.part(0, own.size)))
+    # spikes that are near each other are looked at together
+    for group in np.split(at, np.flatnonzero(np.diff(at) > own.n_block) + 1):
+        first, stop = max(int(group[0]) - 2, 0), min(int(group[-1]) + 3, own.size)
+        felt = np.zeros(stop - first, dtype=np.bool_)
+        # a blow is felt by more than one sensor, a disturbed sample by one
+        for other, channel in scanned.items():
+            if other != name:
+                felt |= np.abs(channel.standardised(first, stop)) > _FELT_SIGMA
+        before = max(first - 2, 0)
+        error = prediction_error(own.part(before, min(stop + 2, own.size)))[first - before :][: stop - first]
+        spiked[first:stop] &= ~widened(felt, 5) & (np.abs(error) > smallest)
+    return spiked
 
 
 def _cut_off(channel: xr.DataArray) -> BoolArray:
@@ -171,7 +166,7 @@ def _cut_off(channel: xr.DataArray) -> BoolArray:
     return np.asarray(extreme & ~clipped_samples(channel))
 
 
-def held_samples(values: FloatArray, rate_hz: float) -> BoolArray:
+def held_samples(channel: ScannedChannel) -> BoolArray:
     """True in runs of equal samples that are longer than the signal on both sides can stand still.
 
     Notes
@@ -180,44 +175,40 @@ def held_samples(values: FloatArray, rate_hz: float) -> BoolArray:
     crest. A and ω are those of the second before and of the second after, whichever is slower; q is the smallest
     change between samples that is there.
     """
-    equal = np.concatenate([[False], values[1:] == values[:-1]])
-    held = np.zeros(values.size, dtype=np.bool_)
-    bounds = run_bounds(equal, True)
-    long_runs = bounds[bounds[:, 1] - bounds[:, 0] + 1 >= _SHORTEST_HOLD] - (1, 0)
-    if not long_runs.size:
-        return held
-    changes = np.abs(np.diff(values))
-    step = float(np.min(changes[changes > 0], initial=math.inf))
-    n = round(_NEIGHBOURHOOD_S * rate_hz)
-    for start, stop in long_runs.tolist():
-        sides = values[max(0, start - n) : start], values[stop : stop + n]
+    held = np.zeros(channel.size, dtype=np.bool_)
+    bounds, n = channel.bounds, channel.n_block
+    for start, stop in bounds.long_runs.tolist():
+        sides = ((max(0, start - n), start), (stop, min(stop + n, channel.size)))
         # the side that is too slow for a hold spares the other
-        if all(stop - start > _HOLD_MARGIN * _longest_hold(side, step) for side in sides):
+        if all(stop - start > _HOLD_MARGIN * _longest_hold(channel.part(*side), bounds.step) for side in sides):
             held[start:stop] = True
     return held
 
 
-def repeated_samples(values: FloatArray) -> BoolArray:
+def repeated_samples(channel: ScannedChannel) -> BoolArray:
     """True at samples that repeat the one before, where a channel does so regularly although it moves.
 
     A converter that is read faster than it converts, or a slower channel that was filled up to the common rate.
     """
-    change = np.abs(np.diff(values))
-    repeated = np.concatenate([[False], change == 0])
-    none = np.zeros(values.size, dtype=np.bool_)
-    if repeated.mean() < _REPEATED_SHARE:
+    none = np.zeros(channel.size, dtype=np.bool_)
+    if channel.bounds.n_repeated < _REPEATED_SHARE * channel.size:
         return none
+    change = np.abs(np.diff(channel.part(0, channel.size)))
     moving = change[np.isfinite(change) & (change > 0)]
     if moving.size == 0:
         return none
     # equal neighbours are no wonder where the signal changes by a step of the converter or two
-    return repeated if float(np.median(moving)) > _REPEATED_STEPS * float(moving.min()) else none
+    repeats = float(np.median(moving)) > _REPEATED_STEPS * float(moving.min())
+    return np.concatenate([[False], change == 0]) if repeats else none
 
 
 def _longest_hold(values: FloatArray, step: float) -> float:
     """Samples for which a signal like this can stay within one step; infinite if it is at rest or too short."""
     values = values[np.isfinite(values)]
-    if values.size < 2 * _SHORTEST_HOLD:
+    if values.size < 2 * SHORTEST_HOLD:
+        return math.inf
+    # the range first, which costs a tenth of quantiles
+    if float(values.max() - values.min()) < 8 * step:
         return math.inf
     low, high = np.quantile(values, (0.05, 0.95))
     amplitude = 0.5 * float(high - low)
@@ -229,24 +220,27 @@ def _longest_hold(values: FloatArray, step: float) -> float:
     return 2 * math.acos(max(-1.0, 1 - step / amplitude)) / omega
 
 
-def filled_samples(values: FloatArray, rate_hz: float) -> BoolArray:
+def filled_samples(channel: ScannedChannel) -> BoolArray:
     """True where a channel that has noise before and after has none: a gap closed by a line or a curve."""
-    error = prediction_error(values)
+    bounds, n, size = channel.bounds, channel.n_block, channel.size
+    # the quietest place is not as quiet as that often: most channels end here
+    loudest = bounds.quietest_power.min() / _MADE_UP_SHARE**2
+    n_below = np.minimum(n, size - n * np.arange(bounds.loudest_power.size))[bounds.loudest_power < loudest].sum()
+    if n_below > _OFTEN * size + 1:
+        return np.zeros(size, dtype=np.bool_)
+    error = prediction_error(channel.part(0, size))
     # NaN neither hides nor makes a stretch: it counts as noise
     power = np.where(np.isfinite(error), error**2, np.finfo(np.float64).max)
     finite = np.where(np.isfinite(error), power, 0.0)
     typical = float(np.median(finite))
     # the steps of a converter alone leave 0.4 of a step: only a channel with noise beyond them can lack it
-    changes = np.abs(np.diff(values))
-    step = float(np.min(changes[changes > 0], initial=math.inf))
-    if not math.sqrt(typical) > _BEYOND_STEPS * step:
-        return np.zeros(values.size, dtype=np.bool_)
-    largest = maximum_filter1d(power, _QUIETEST_STRETCH)
+    if not math.sqrt(typical) > _BEYOND_STEPS * bounds.step:
+        return np.zeros(size, dtype=np.bool_)
+    largest = maximum_filter1d(power, QUIETEST_STRETCH)
     # nowhere near as quiet as the channel often is: a modulated motion has calm moments of its own
     quiet: BoolArray = largest < _MADE_UP_SHARE**2 * float(np.quantile(largest, _OFTEN))
     if not quiet.any():
         return quiet
-    n = round(_NEIGHBOURHOOD_S * rate_hz)
     usual = uniform_filter1d(np.minimum(finite, 9 * typical), n)
     # and than the quieter side: before a motion starts and after it stops nothing is compared
     beside = np.minimum(np.roll(usual, n), np.roll(usual, -n))
@@ -255,34 +249,31 @@ def filled_samples(values: FloatArray, rate_hz: float) -> BoolArray:
     beside[beside < _ROUNDING * np.max(usual)] = 0.0
     quiet &= largest < _MADE_UP_SHARE**2 * beside
     # back to all samples of the stretches that were seen at their middle; the error reaches over two to each side
-    return _widened(quiet, _QUIETEST_STRETCH + 4)
+    return widened(quiet, QUIETEST_STRETCH + 4)
 
 
-def standardised_errors(values: FloatArray, rate_hz: float) -> FloatArray:
-    """Prediction errors over their usual size around, shape (n,); zero beside lost samples."""
-    there = np.isfinite(values)
-    error = prediction_error(np.where(there, values, 0.0))
-    error[_widened(~there, 9)] = 0.0
-    n = max(round(_NEIGHBOURHOOD_S * rate_hz), 5)
-    # the median of |e| is 0.6745 σ of a normal distribution
-    standardised = 0.6745 * error / _usual_size(error, n)
-    # beside a stretch without any noise everything is a spike, by any factor
-    return np.asarray(np.clip(standardised, -_LARGEST_STANDARDISED, _LARGEST_STANDARDISED))
-
-
-def spikes(standardised: FloatArray) -> BoolArray:
-    """True at single samples that their four neighbours do not predict.
+def spikes(channel: ScannedChannel) -> BoolArray:
+    """True at single samples that their four neighbours do not predict, shape (n_samples,).
 
     One wrong sample among good ones leaves the prediction errors 1, −4, 6, −4, 1 in a row; a blow that an
     anti-aliasing filter has let through is wider and leaves another pattern.
-
-    Parameters
-    ----------
-    standardised : ndarray, shape (n_samples,)
-        Of `standardised_errors`.
     """
-    pattern_power = float((_PREDICTION_ERROR**2).sum())
-    size = np.convolve(standardised, _PREDICTION_ERROR[::-1], mode="same") / pattern_power
+    found = np.zeros(channel.size, dtype=np.bool_)
+    # the error of five predictions in a row is at most that many times the largest of them
+    gain = float(np.abs(PREDICTION_ERROR).sum() / (PREDICTION_ERROR**2).sum())
+    for start, stop in channel.loud_stretches(_SPIKE_SIGMA / gain):
+        # the pattern is five samples wide, and the largest of five is sought
+        first, last = max(start - 4, 0), min(stop + 4, channel.size)
+        found[start:stop] = _fitting_the_pattern(channel.standardised(first, last))[start - first :][
+            : stop - start
+        ]
+    return found
+
+
+def _fitting_the_pattern(standardised: FloatArray) -> BoolArray:
+    """True where standardised prediction errors are those of one wrong sample."""
+    pattern_power = float((PREDICTION_ERROR**2).sum())
+    size = np.convolve(standardised, PREDICTION_ERROR[::-1], mode="same") / pattern_power
     large = np.abs(size) > _SPIKE_SIGMA
     if not large.any():
         return large
@@ -293,15 +284,3 @@ def spikes(standardised: FloatArray) -> BoolArray:
     found = large & (explained > _SPIKE_SHAPE * power) & (explained > bend)
     # the largest of its surroundings only: its tails fit the pattern less
     return np.asarray(found & (np.abs(size) >= maximum_filter1d(np.abs(size), 5)))
-
-
-def _usual_size(error: FloatArray, n: int) -> FloatArray:
-    """Root of the median of e² in blocks of n, of the largest of three blocks in a row; one value per sample."""
-    n_blocks = max(error.size // n, 1)
-    medians = np.median((error[: n_blocks * n].reshape(n_blocks, -1)) ** 2, axis=1)
-    wide = maximum_filter1d(medians, 3, mode="nearest")
-    # a channel without any noise has its rounding
-    size = np.sqrt(np.maximum(wide, np.finfo(np.float64).tiny))
-    n_of_block = np.full(n_blocks, max(error.size // n_blocks, 1))
-    n_of_block[-1] += error.size - n_of_block.sum()
-    return np.repeat(size, n_of_block)

@@ -14,7 +14,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from sloshlab.consistency.samples import WHITE_GAIN, prediction_error
+from sloshlab.consistency.sample_scan import prediction_error
+from sloshlab.consistency.samples import WHITE_GAIN
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -7,15 +7,14 @@ import pytest
 from shaken_tank import RATE_HZ, tank_run, with_channel
 
 from sloshlab.consistency.finding import Action
+from sloshlab.consistency.sample_scan import ScannedChannel, prediction_error
 from sloshlab.consistency.samples import (
     SAMPLE_CHECKS,
     examined_samples,
     filled_samples,
     held_samples,
-    prediction_error,
     repeated_samples,
     spikes,
-    standardised_errors,
 )
 
 CELL = "force_cell_1"
@@ -102,7 +101,7 @@ def test_values_that_stand_twice_are_repeated(clean):
     twice = with_channel(clean, CELL, lambda values: values[(np.arange(values.size) // 2) * 2])
     assert ("repeated samples", CELL) in found(twice)
     values = np.repeat(np.sin(np.arange(500) / 5.0), 2)
-    assert repeated_samples(values).mean() == pytest.approx(0.5, abs=0.01)
+    assert repeated_samples(ScannedChannel(values, RATE_HZ)).mean() == pytest.approx(0.5, abs=0.01)
 
 
 @pytest.mark.parametrize(("share", "action"), [(0.7, Action.REFUSED), (0.9999, Action.MASKED)])
@@ -135,9 +134,9 @@ def test_a_bend_is_no_spike():
     time = np.arange(20_000) / RATE_HZ
     generator = np.random.default_rng(6)
     values = 1e-4 * generator.standard_normal(time.size) + np.where(time < 20.0, 0.0, 3.0 * (time - 20.0))
-    assert not spikes(standardised_errors(values, RATE_HZ)).any()
+    assert not spikes(ScannedChannel(values, RATE_HZ)).any()
     values[12_345] += 5e-3
-    assert np.flatnonzero(spikes(standardised_errors(values, RATE_HZ))).tolist() == [12_345]
+    assert np.flatnonzero(spikes(ScannedChannel(values, RATE_HZ))).tolist() == [12_345]
 
 
 def test_lost_samples_are_no_finding(clean):
@@ -172,5 +171,5 @@ def test_rest_before_a_motion_is_not_held_or_filled():
     generator = np.random.default_rng(2)
     moving = np.where(time > 20, np.sin(2 * np.pi * 8 * time) + 0.01 * generator.standard_normal(time.size), 0.0)
     values = np.round(moving, 3)
-    assert not held_samples(values, RATE_HZ).any()
-    assert not filled_samples(values, RATE_HZ).any()
+    assert not held_samples(ScannedChannel(values, RATE_HZ)).any()
+    assert not filled_samples(ScannedChannel(values, RATE_HZ)).any()
