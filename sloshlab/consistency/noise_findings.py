@@ -42,8 +42,7 @@ def noise_findings(recording: xr.Dataset, inertia: Inertia, series: SensorSeries
         for name, partner in zip(names, [*names[1:], names[0]], strict=True):
             if name == partner:
                 continue
-            own, other = (np.asarray(recording[one].values, dtype=np.float64) for one in (name, partner))
-            pair = pair_noise(own, other, n_per_block)
+            pair = pair_noise(recording[name].values, recording[partner].values, n_per_block)
             found += _noise(recording[name], pair, w_bar_std * share * force_per_unit)
             found += _compression(name, pair, inertia, 1.0 / len(names))
     return found

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numba import njit
 
-from sloshlab.consistency.sample_scan import prediction_error
 from sloshlab.consistency.samples import WHITE_GAIN
 
 FloatArray = npt.NDArray[np.float64]
@@ -22,6 +22,8 @@ FloatArray = npt.NDArray[np.float64]
 _N_LEVELS: Final = 9
 """Classes of the reading, from one end of its range to the other."""
 _FEWEST_PER_LEVEL: Final = 200
+_REACH: Final = 0.995
+"""Quantile of the magnitudes of the readings that counts as the end of their range."""
 _CLIPPED_AT: Final = 4.0
 """Errors beyond this many times their mean size count as that: spikes and blows must not decide."""
 
@@ -45,7 +47,9 @@ class PairNoise:
     compression_std: float
 
 
-def pair_noise(values: FloatArray, reference: FloatArray, n_per_block: int) -> PairNoise:
+def pair_noise(
+    values: npt.NDArray[np.floating], reference: npt.NDArray[np.floating], n_per_block: int
+) -> PairNoise:
     """Noise and compression of a sensor y beside another, x, that measures the same up to a factor.
 
     Parameters
@@ -64,26 +68,20 @@ def pair_noise(values: FloatArray, reference: FloatArray, n_per_block: int) -> P
     unknown = PairNoise(math.nan, math.nan, math.nan, math.nan)
     if n_blocks < 4:
         return unknown
-    shape = (n_blocks, n_per_block)
-    cut = n_blocks * n_per_block
-    y, x = values[:cut].reshape(shape), reference[:cut].reshape(shape)
-    e_y, e_x = (prediction_error(signal)[:cut].reshape(shape) for signal in (values, reference))
-    whole = np.isfinite(e_y + e_x + y + x).all(axis=1)
-    if whole.sum() < 4:
+    blocks = _Blocks(values, reference, n_per_block)
+    moments = np.array([_moments(*blocks.of(k)) for k in range(n_blocks)])
+    whole = np.flatnonzero(np.isfinite(moments).all(axis=1))
+    if whole.size < 4:
         return unknown
-    y, x, e_y, e_x = y[whole], x[whole], e_y[whole], e_x[whole]
-    y, x = y - y.mean(axis=1, keepdims=True), x - x.mean(axis=1, keepdims=True)
-    power = (x * x).mean(axis=1)
-    gain = np.divide((x * y).mean(axis=1), power, out=np.ones_like(power), where=power > 0)
+    mean_y, power, product, e_yy, e_xx, cross = moments[whole].T
+    gain = np.divide(product, power, out=np.ones_like(power), where=power > 0)
     moving = (power > 0.01 * np.median(power)) & (gain != 0)
     if moving.sum() < 4:
         return unknown
-    y, e_y, e_x, gain = y[moving], e_y[moving], e_x[moving], gain[moving]
-    cross = (e_x * e_y).mean(axis=1)
     # medians over blocks: a block with a spike is one of many
-    own = float(np.median((e_y * e_y).mean(axis=1) - gain * cross))
-    other = float(np.median((e_x * e_x).mean(axis=1) - cross / gain))
-    loss, std = _compression(y.ravel(), (e_y - gain[:, None] * e_x).ravel())
+    own = float(np.median((e_yy - gain * cross)[moving]))
+    other = float(np.median((e_xx - cross / gain)[moving]))
+    loss, std = _compression(blocks, whole[moving], mean_y[moving], gain[moving])
     return PairNoise(
         std=math.sqrt(max(own, 0.0)) / WHITE_GAIN,
         reference_std=math.sqrt(max(other, 0.0)) / WHITE_GAIN,
@@ -92,15 +90,73 @@ def pair_noise(values: FloatArray, reference: FloatArray, n_per_block: int) -> P
     )
 
 
-def _compression(reading: FloatArray, noise: FloatArray) -> tuple[float, float]:
+class _Blocks:
+    """Two signals and their prediction errors, one block of n at a time in buffers that stay in the cache."""
+
+    def __init__(
+        self, values: npt.NDArray[np.floating], reference: npt.NDArray[np.floating], n_per_block: int
+    ) -> None:
+        self._signals, self.n = (values, reference), n_per_block
+        self._samples, self._errors = np.empty((2, n_per_block + 4)), np.empty((2, n_per_block))
+
+    def of(self, block: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """y, x and their errors in a block, shape (n,) each; until the next block is asked for."""
+        start = block * self.n
+        low, high = max(start - 2, 0), min(start + self.n + 2, self._signals[0].size)
+        at = low - start + 2
+        for signal, samples, error in zip(self._signals, self._samples, self._errors, strict=True):
+            # beyond the ends of the signal, where the error is zero
+            samples[:] = 0.0
+            samples[at : at + high - low] = signal[low:high]
+            _predicted_wrong(samples, error)
+            error[:at] = 0.0
+            error[max(self._signals[0].size - 2 - start, 0) :] = 0.0
+        y, x = self._samples[:, 2:-2]
+        return y, x, self._errors[0], self._errors[1]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _predicted_wrong(samples: FloatArray, error: FloatArray) -> None:
+    """Each sample but two at each end minus the cubic through its four neighbours."""
+    a, b, c, d, e = samples[:-4], samples[1:-3], samples[2:-2], samples[3:-1], samples[4:]
+    for i in range(error.size):
+        error[i] = (a[i] - 4.0 * b[i] + 6.0 * c[i] - 4.0 * d[i] + e[i]) / 6.0
+
+
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})  # type: ignore[untyped-decorator]
+def _moments(
+    y: FloatArray, x: FloatArray, e_y: FloatArray, e_x: FloatArray
+) -> tuple[float, float, float, float, float, float]:
+    """Mean of y, ⟨x²⟩ and ⟨x y⟩ about the means, ⟨e_y²⟩, ⟨e_x²⟩, ⟨e_x e_y⟩; NaN where a sample is lost."""
+    n, sum_y, sum_x = y.size, 0.0, 0.0
+    for i in range(n):
+        sum_y += y[i]
+        sum_x += x[i]
+    mean_y, mean_x = sum_y / n, sum_x / n
+    power = product = e_yy = e_xx = cross = 0.0
+    for i in range(n):
+        of_x = x[i] - mean_x
+        power += of_x * of_x
+        product += of_x * (y[i] - mean_y)
+        e_yy += e_y[i] * e_y[i]
+        e_xx += e_x[i] * e_x[i]
+        cross += e_x[i] * e_y[i]
+    return mean_y, power / n, product / n, e_yy / n, e_xx / n, cross / n
+
+
+def _compression(
+    blocks: _Blocks, chosen: npt.NDArray[np.intp], mean: FloatArray, gain: FloatArray
+) -> tuple[float, float]:
     """How much smaller the noise is at both ends of the readings than in their middle, with standard deviation."""
-    reach = float(np.quantile(np.abs(reading), 0.995))
-    if reach == 0 or reading.size < _N_LEVELS * _FEWEST_PER_LEVEL:
+    n = chosen.size * blocks.n
+    reach, mean_noise = _reach_and_noise(blocks, chosen, mean, gain)
+    if reach == 0 or n < _N_LEVELS * _FEWEST_PER_LEVEL:
         return math.nan, math.nan
-    level = np.clip((reading / reach + 1) / 2 * _N_LEVELS, 0, _N_LEVELS - 1).astype(np.int64)
-    limited = np.minimum(np.abs(noise), _CLIPPED_AT * float(np.abs(noise).mean()))
-    counts = np.bincount(level, minlength=_N_LEVELS)
-    sizes = np.bincount(level, weights=limited, minlength=_N_LEVELS) / np.maximum(counts, 1)
+    counts, sizes = np.zeros(_N_LEVELS, dtype=np.int64), np.zeros(_N_LEVELS)
+    for k, block in enumerate(chosen):
+        y, _, e_y, e_x = blocks.of(int(block))
+        _by_level(y, e_y, e_x, _Level(mean[k], gain[k], reach, _CLIPPED_AT * mean_noise), counts, sizes)
+    sizes /= np.maximum(counts, 1)
     middle = slice(_N_LEVELS // 2 - 1, _N_LEVELS // 2 + 2)
     if min(counts[0], counts[-1], counts[middle].sum()) < _FEWEST_PER_LEVEL or sizes[middle].mean() == 0:
         return math.nan, math.nan
@@ -108,3 +164,54 @@ def _compression(reading: FloatArray, noise: FloatArray) -> tuple[float, float]:
     loss = 1.0 - float(max(sizes[0], sizes[-1])) / float(sizes[middle].mean())
     # relative standard deviation of a mean magnitude, 0.756/√n; neighbours share samples of the filter
     return loss, 0.756 * math.sqrt(3.0 / min(counts[0], counts[-1]))
+
+
+def _reach_and_noise(
+    blocks: _Blocks, chosen: npt.NDArray[np.intp], mean: FloatArray, gain: FloatArray
+) -> tuple[float, float]:
+    """Quantile of the magnitudes of all readings that is their reach, and the mean magnitude of the noise."""
+    n, noise = chosen.size * blocks.n, 0.0
+    largest: list[FloatArray] = []
+    # as many of the largest as the quantile needs, kept as small as they can be while blocks come
+    n_needed, limit, n_kept = n - math.floor(_REACH * (n - 1)), 0.0, 0
+    for k, block in enumerate(chosen):
+        y, _, e_y, e_x = blocks.of(int(block))
+        reading = np.abs(y - mean[k])
+        noise += float(np.abs(e_y - gain[k] * e_x).sum())
+        kept = reading[reading >= limit]
+        largest.append(kept)
+        n_kept += kept.size
+        if n_kept > 2 * n_needed + blocks.n:
+            together = np.concatenate(largest)
+            largest = [np.partition(together, together.size - n_needed)[-n_needed:]]
+            limit, n_kept = float(largest[0].min()), n_needed
+    top = np.sort(np.concatenate(largest))[-n_needed:]
+    # linear between two readings, as usual
+    part = _REACH * (n - 1) % 1.0
+    return float(top[0] + part * (top[min(1, n_needed - 1)] - top[0])), noise / n
+
+
+class _Level(NamedTuple):
+    """Of what a reading and its noise are measured against in a block."""
+
+    mean: float
+    gain: float
+    reach: float
+    largest_noise: float
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _by_level(
+    y: FloatArray,
+    e_y: FloatArray,
+    e_x: FloatArray,
+    level: _Level,
+    counts: npt.NDArray[np.int64],
+    sizes: FloatArray,
+) -> None:
+    """Add the noise of a block to the classes of its readings."""
+    for i in range(y.size):
+        position = ((y[i] - level.mean) / level.reach + 1.0) / 2.0 * _N_LEVELS
+        k = int(min(max(position, 0.0), _N_LEVELS - 1.0))
+        counts[k] += 1
+        sizes[k] += min(abs(e_y[i] - level.gain * e_x[i]), level.largest_noise)
