@@ -224,8 +224,8 @@ def filled_samples(channel: ScannedChannel) -> BoolArray:
     """True where a channel that has noise before and after has none: a gap closed by a line or a curve."""
     bounds, n, size = channel.bounds, channel.n_block, channel.size
     # the quietest place is not as quiet as that often: most channels end here
-    loudest = bounds.quietest_power.min() / _MADE_UP_SHARE**2
-    n_below = np.minimum(n, size - n * np.arange(bounds.loudest_power.size))[bounds.loudest_power < loudest].sum()
+    n_of_part = np.minimum(n, size - n * np.arange(bounds.loudest_power.size))
+    n_below = n_of_part[_MADE_UP_SHARE**2 * bounds.loudest_power < bounds.quietest_power.min()].sum()
     if n_below > _OFTEN * size + 1:
         return np.zeros(size, dtype=np.bool_)
     error = prediction_error(channel.part(0, size))
