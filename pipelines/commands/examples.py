@@ -48,6 +48,7 @@ EXAMPLES: Final[dict[str, tuple[str, ...]]] = {
     "train": (
         "sloshlab train vfa_1.nc vfa_2.nc valid.nc --rig rig.toml -o rom.nc",
         "sloshlab train vfa_*.nc valid.nc --rig rig.toml --still empty.nc --test sweep_3g.nc -o rom.nc",
+        "sloshlab train low_*.nc high_*.nc --rig rig_low.toml --rig rig_high.toml -o rom.nc",
     ),
     "validate": ("sloshlab validate rom.nc unseen.nc --rig rig.toml -o results",),
     "study": ("sloshlab study vfa_1.nc vfa_2.nc valid.nc --rig rig.toml -o study --cases source --workers 2",),

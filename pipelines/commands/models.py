@@ -20,6 +20,7 @@ from pipelines.commands.application import (
 )
 from pipelines.commands.completion import NETWORKS, one_of
 from sloshlab.configurations import CONFIGURATIONS, SLOSHING
+from sloshlab.errors import InputError
 
 Runs = Annotated[
     list[Path],
@@ -56,7 +57,14 @@ StartSeed = Annotated[int, typer.Option("--seed", min=0, help="Of the starts.")]
 @app.command()
 def train(
     runs: Runs,
-    rig: ModelRig,
+    rig: Annotated[
+        list[Path],
+        typer.Option(
+            metavar="RIG.toml",
+            help="Rig of the runs; several, filled to different levels: the network sees the fill level.",
+            show_default=False,
+        ),
+    ],
     output: OutputFile,
     *,
     still: Still = None,
@@ -88,16 +96,27 @@ def train(
     as_json: Json = False,
 ) -> None:
     """Reduced-order model of the liquid from runs on the shaker, and its validation report."""
+    from pipelines.liquid_model.fill_levels import files_of_fills, train_over_fills
     from pipelines.liquid_model.model_settings import ModelSettings
     from pipelines.liquid_model.train import train_and_report
     from pipelines.liquid_model.training_runs import RunFiles
     from sloshlab.reduced_order_model.training import TrainingSettings
 
-    files = RunFiles.of(runs, still or [], rig)
     wanted = ModelSettings(
         model, delays, output_delays, neurons, network, rate_hz, memory_s, tuple(sudden_start or ()), ensemble
     )
     settings = TrainingSettings(n_epochs=epochs, n_starts=starts, seed=seed)
+    if len(rig) > 1:
+        filled = files_of_fills(runs, still or [], rig)
+        if test:
+            got, remedy = "runs for a report", "give them to sloshlab validate, fill by fill"
+            raise InputError("--test with several rigs", got=got, allowed="none", remedy=remedy)
+        summary = train_over_fills(
+            filled, wanted, settings, output, command=command_as_given(), overwrite=overwrite
+        )
+        finish(summary, as_json)
+        return
+    files = RunFiles.of(runs, still or [], rig[0])
     command = None if no_report else command_as_given()
     summary = train_and_report(files, test or [], wanted, settings, output, command=command, overwrite=overwrite)
     finish(summary, as_json)

@@ -26,6 +26,7 @@ from sloshlab.reduced_order_model.liquid_signals import LiquidSignals
 from sloshlab.reduced_order_model.model import ReducedOrderModel
 from sloshlab.reduced_order_model.stability import stability
 from sloshlab.reduced_order_model.storage import load_model, save_model
+from sloshlab.reduced_order_model.tank_scaling import filled_model
 from sloshlab.reduced_order_model.training import Epoch, TrainingRecord, TrainingSettings, fit
 from sloshlab.reduced_order_model.validity_domain import ValidityDomain
 
@@ -342,6 +343,7 @@ def validate_model(
             raise InputError(f"run {run}", got="one that the model was trained on", allowed="other runs")
     require_new_runs(test, files)
     runs = training_runs(files, model.sampling_rate_hz)
+    model = filled_model(model, runs.rig.liquid.fill_level)
     inputs = (path, *files.validation, *test, *files.still, files.rig)
     provenance = provenance_of(command, inputs, settings="validation")
     return write_validation(model, runs, test, folder, provenance=provenance)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -120,6 +120,13 @@ class TrainingRuns:
             return found
         return (f"dry mass taken from {self.files.rig.name}, not identified; give --still runs", *found)
 
+    def at_rate(self, rate_hz: float) -> TrainingRuns:
+        """Return the runs at a rate, not above that of the recordings."""
+        training, validation = (
+            [signals.at_rate(rate_hz) for signals in group] for group in (self.training, self.validation)
+        )
+        return replace(self, rate_hz=rate_hz, training=training, validation=validation)
+
     def facts(self) -> dict[str, Any]:
         """Return what a model keeps of them."""
         return {
@@ -145,6 +152,18 @@ def training_runs(files: RunFiles, rate_hz: float | None = None) -> TrainingRuns
     InputError
         If a recording, the rig or their combination is bad.
     """
+    runs = runs_as_recorded(files)
+    return runs.at_rate(rate_hz or runs.rate.sampling_rate_hz)
+
+
+def runs_as_recorded(files: RunFiles) -> TrainingRuns:
+    """Read the runs of a training at the rate of the recordings.
+
+    Raises
+    ------
+    InputError
+        If a recording, the rig or their combination is bad.
+    """
     rig = rig_of(files.rig)
     still = read_still_runs(files.still, rig, files.rig.name)
     read = {path: sloshing_run(path, still.reference) for path in (*files.training, *files.validation)}
@@ -153,17 +172,9 @@ def training_runs(files: RunFiles, rate_hz: float | None = None) -> TrainingRuns
         for paths in (files.training, files.validation)
     )
     rate = chosen_rate(training or validation)
-    wanted = rate_hz or rate.sampling_rate_hz
-    return TrainingRuns(
-        files,
-        rig,
-        still,
-        rate,
-        wanted,
-        [signals.at_rate(wanted) for signals in training],
-        [signals.at_rate(wanted) for signals in validation],
-        tuple(examination for _, examination in read.values()),
-    )
+    recorded_hz = min(signals.sampling_rate_hz for signals in (*training, *validation))
+    examined = tuple(examination for _, examination in read.values())
+    return TrainingRuns(files, rig, still, rate, recorded_hz, training, validation, examined)
 
 
 def require_new_runs(test: Sequence[RunSource], files: RunFiles) -> None:

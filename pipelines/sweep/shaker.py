@@ -103,7 +103,7 @@ def analyse_shaker(
     InputError
         If a run, a rig or their combination is bad; nothing has been written then.
     """
-    rigs = _rigs(rig_paths)
+    rigs = rigs_by_name(rig_paths)
     runs = _assigned(paths, rigs)
     results: dict[str, list[RunResult]] = {name: [] for name in rigs}
     still: dict[str, StillRuns] = {}
@@ -123,7 +123,14 @@ def analyse_shaker(
         return _experiment(results, rigs, still, settings, inputs)
 
 
-def _rigs(paths: Sequence[RigSource]) -> dict[str, Rig]:
+def rigs_by_name(paths: Sequence[RigSource]) -> dict[str, Rig]:
+    """Rigs of one tank by the names that their runs call them.
+
+    Raises
+    ------
+    InputError
+        If two have one name, or they describe different tanks.
+    """
     rigs: dict[str, Rig] = {}
     for path in paths:
         if path.name in rigs:

@@ -17,7 +17,7 @@ from sloshlab.lateral_sloshing.box_tank import BoxTank
 from sloshlab.reduced_order_model.departures import Departure, TankHeight, departures_of_motion
 from sloshlab.reduced_order_model.model import ReducedOrderModel
 from sloshlab.reduced_order_model.stepping import SteppedModel
-from sloshlab.reduced_order_model.tank_scaling import TankScaling, scaled_to
+from sloshlab.reduced_order_model.tank_scaling import model_for_tank
 from sloshlab.reduced_order_model.validity_domain import ValidityDomain, motion_cycles
 from sloshlab.rig import Liquid, Rig, Tank
 
@@ -71,10 +71,9 @@ def model_in_tank(model: ReducedOrderModel, tank: AircraftTank) -> SteppedModel:
     Raises
     ------
     InputError
-        If the model cannot run in a loop, does not tell its tank, or was trained at another fill level.
+        If the model cannot run in a loop, does not tell its tank, or was trained at other fill levels.
     """
-    factors = TankScaling.of_facts(model.facts, _as_rig(tank.box))
-    return SteppedModel(model if factors.is_same else scaled_to(model, factors))
+    return SteppedModel(model_for_tank(model, _as_rig(tank.box))[0])
 
 
 def tank_departures(response: FlightResponse, models: Mapping[str, ReducedOrderModel]) -> list[TankDeparture]:
@@ -131,7 +130,7 @@ def _from_domain(response: FlightResponse, tank: AircraftTank, model: ReducedOrd
         unknown = "its model does not tell where it was trained; whether it is valid here is not known"
         return [TankDeparture(tank.name, unknown, ((0.0, float(response.time_s[-1])),))]
     velocity, rate_hz = response.seen_velocity_m_per_s[tank.name], response.model_rate_hz[tank.name]
-    factors = TankScaling.of_facts(model.facts, _as_rig(tank.box))
+    _, factors = model_for_tank(model, _as_rig(tank.box))
     height = TankHeight(tank.box.height_m, factors.time**2)
     domain = ValidityDomain.of_facts(model.facts["domain"])
     left = departures_of_motion(motion_cycles(velocity, rate_hz), velocity, rate_hz, domain, height)

@@ -125,6 +125,17 @@ class ReducedOrderModel:
         """Whether it sees its own outputs."""
         return bool(self.delays.outputs)
 
+    @property
+    def constant_regressors(self) -> FloatArray:
+        """What the network sees behind the delay lines without change during a run: its fill level, if any.
+
+        Raises
+        ------
+        InputError
+            If it sees the fill level and none was set.
+        """
+        return np.empty(0) if self.fill is None else self.fill.regressor(1)
+
     def at_fill(self, level: float) -> ReducedOrderModel:
         """Return the model for a tank filled to a level.
 

@@ -28,6 +28,19 @@ CUBIC: Final = np.array(
 """Coefficients of 1, x, x², x³ of the cubic through values at x = −2, −1, 0, 1."""
 
 
+def require_no_slow_states(model: ReducedOrderModel) -> None:
+    """Refuse a model whose regressors a loop would have to integrate.
+
+    Raises
+    ------
+    InputError
+        If it sees slow states.
+    """
+    if model.agitation is not None:
+        got = "a model with slow states among its regressors"
+        raise InputError("rom", got=got, allowed="models without, or with a break-up", remedy="train another")
+
+
 class SteppedModel:
     """A model that begins at rest and takes its own steps.
 
@@ -39,7 +52,7 @@ class SteppedModel:
     Raises
     ------
     InputError
-        If it sees the present input, or slow states beside its delay lines.
+        If it sees the present input, slow states beside its delay lines, or a fill level that was not set.
 
     Attributes
     ----------
@@ -48,9 +61,7 @@ class SteppedModel:
     """
 
     def __init__(self, model: ReducedOrderModel) -> None:
-        if model.delays.n_states:
-            got = "a model with slow states or the fill level among its regressors"
-            raise InputError("rom", got=got, allowed="models without, or with a break-up", remedy="train another")
+        require_no_slow_states(model)
         if min(model.delays.inputs) < 1:
             raise InputError(
                 "rom: input delays",
@@ -61,6 +72,7 @@ class SteppedModel:
         self._model, self.sampling_rate_hz = model, model.sampling_rate_hz
         self._of_inputs = np.array(model.delays.inputs) - 1
         self._of_outputs = np.array(model.delays.outputs, np.int64) - 1
+        self._constants = model.constant_regressors
         self._break_up = None if model.break_up is None else np.array(astuple(model.break_up))
         network = model.network
         self._is_radial = isinstance(network, NormalisedRadialBasis | RadialBasis)
@@ -119,7 +131,7 @@ class SteppedModel:
 
     def _network(self) -> float:
         model = self._model
-        phi = np.concatenate([self._velocities[self._of_inputs], self._outputs[self._of_outputs]])
+        phi = np.concatenate([self._velocities[self._of_inputs], self._outputs[self._of_outputs], self._constants])
         if self._is_radial:
             return float(free_run.evaluate(self._kind, model.theta, phi, self._features, self._factors))
         return float(model.network.output(np, model.theta, phi[:, None])[0])

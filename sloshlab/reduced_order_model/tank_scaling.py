@@ -24,6 +24,8 @@ HYPOTHESES: Final = (
 _SAME_FILL: Final = 0.01
 _SAME: Final = 1e-9
 _NEEDED: Final = ("fill_level", "tank_height_m", "liquid_mass_kg")
+FULL_MASS: Final = "full_liquid_mass_kg"
+"""Fact of a model of several fills: mass of the liquid that would fill the tank, whose forces it says."""
 _LIQUID: Final = ("kinematic_viscosity_m2_per_s", "surface_tension_n_per_m", "density_kg_per_m3")
 
 
@@ -167,3 +169,51 @@ def scaled_to(model: ReducedOrderModel, factors: TankScaling) -> ReducedOrderMod
         agitation=memory,
         break_up=model.break_up and model.break_up.scaled(factors.time),
     )
+
+
+def filled_model(model: ReducedOrderModel, fill_level: float) -> ReducedOrderModel:
+    """Return a model of several fills as that of its own tank at one of them; any other model as it is.
+
+    Parameters
+    ----------
+    model : ReducedOrderModel
+        One that sees the fill says forces on the mass of a full tank, `full_liquid_mass_kg` of its facts.
+    fill_level : float
+
+    Returns
+    -------
+    ReducedOrderModel
+        Forces are those on the liquid that is there; its facts tell this tank.
+
+    Raises
+    ------
+    InputError
+        If the fill level is beyond those of the training, or the model does not tell its tank.
+    """
+    if model.fill is None or model.fill.level is not None:
+        return model
+    full_kg, old = _stated(model.facts, FULL_MASS), model.scaling
+    scaling = replace(
+        old, output_offset=old.output_offset * fill_level, output_scale=old.output_scale * fill_level
+    )
+    facts = {**model.facts, "fill_level": fill_level, "liquid_mass_kg": full_kg * fill_level}
+    return replace(model.at_fill(fill_level), scaling=scaling, facts=facts)
+
+
+def model_for_tank(model: ReducedOrderModel, rig: Rig) -> tuple[ReducedOrderModel, TankScaling]:
+    """Return a model in the units of a tank and at its fill, and how far that tank is from its own.
+
+    Parameters
+    ----------
+    model : ReducedOrderModel
+        Whose facts tell the tank of its training.
+    rig : Rig
+
+    Raises
+    ------
+    InputError
+        If the model does not tell its tank, or was trained at other fill levels.
+    """
+    filled = filled_model(model, rig.liquid.fill_level)
+    factors = TankScaling.of_facts(filled.facts, rig)
+    return (filled if factors.is_same else scaled_to(filled, factors)), factors

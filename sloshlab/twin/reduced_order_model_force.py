@@ -24,8 +24,9 @@ from sloshlab.reduced_order_model.model import ReducedOrderModel
 from sloshlab.reduced_order_model.networks.multilayer import Multilayer
 from sloshlab.reduced_order_model.networks.network import LARGEST_PARAMETERS, Network
 from sloshlab.reduced_order_model.regressors import MOST_DELAYS
+from sloshlab.reduced_order_model.stepping import require_no_slow_states
 from sloshlab.reduced_order_model.storage import load_model
-from sloshlab.reduced_order_model.tank_scaling import HYPOTHESES, TankScaling, scaled_to
+from sloshlab.reduced_order_model.tank_scaling import HYPOTHESES, TankScaling, model_for_tank
 from sloshlab.reduced_order_model.validity_domain import ValidityDomain
 from sloshlab.rig import Rig
 from sloshlab.twin.reduced_order_model_law import (
@@ -46,6 +47,8 @@ FloatArray = npt.NDArray[np.float64]
 NAME: Final = "reduced_order_model"
 _MULTILAYER: Final = (TANH, RADIAL)
 _LARGEST: Final = 1e9
+MOST_CONSTANTS: Final = 1
+"""Regressors that do not change during a run: the fill level."""
 
 
 def _parts(table: FloatArray) -> dict[str, FloatArray]:
@@ -62,9 +65,12 @@ def _parts(table: FloatArray) -> dict[str, FloatArray]:
         raise _broken("sizes")
     sizes = [int(value) for value in header[2:]]
     edges = np.cumsum([N_HEADER, sizes[0] + sizes[1], *sizes[2:]])
-    if edges[-1] != table.size or header[0] != table.size or header[1] not in NETWORK_NUMBERS:
+    if edges[-1] > table.size or header[0] != table.size or header[1] not in NETWORK_NUMBERS:
         raise _broken("sizes")
     delays, layers, theta, break_up, domain = (table[a:b] for a, b in pairwise(edges))
+    constants = table[edges[-1] :]
+    if constants.size > MOST_CONSTANTS or not np.isfinite(constants).all() or (constants.size and sizes[1]):
+        raise _broken("sizes")
     if break_up.size not in (0, len(fields(BreakUp))) or (break_up.size and sizes[1]):
         raise _broken("break-up")
     if break_up.size:
@@ -72,9 +78,19 @@ def _parts(table: FloatArray) -> dict[str, FloatArray]:
     for values, largest in ((delays, MOST_DELAYS), (layers, LARGEST_PARAMETERS)):
         if not values.size or not ((values >= 1) & (values <= largest) & (values == np.floor(values))).all():
             raise _broken("delays or layers")
-    if theta.size != _n_parameters(int(header[1]), delays.size, layers) or not np.isfinite(theta).all():
+    if (
+        theta.size != _n_parameters(int(header[1]), delays.size + constants.size, layers)
+        or not np.isfinite(theta).all()
+    ):
         raise _broken("parameters")
-    return {"delays": delays, "layers": layers, "theta": theta, "break_up": break_up, "domain": domain}
+    return {
+        "delays": delays,
+        "layers": layers,
+        "theta": theta,
+        "break_up": break_up,
+        "domain": domain,
+        "constants": constants,
+    }
 
 
 def _broken(what: str) -> InputError:
@@ -141,11 +157,9 @@ def term_of(model: ReducedOrderModel, rig: Rig) -> Term:
     Raises
     ------
     InputError
-        If the model sees the present input, does not tell its tank, or was trained at another fill level.
+        If the model sees the present input, does not tell its tank, or was trained at other fill levels.
     """
-    if model.delays.n_states:
-        got = "a model with slow states or the fill level among its regressors"
-        raise InputError("rom", got=got, allowed="models without, or with a break-up", remedy="train another")
+    require_no_slow_states(model)
     # the force would have to wait for the motion that it makes
     if min(model.delays.inputs) < 1:
         raise InputError(
@@ -154,8 +168,7 @@ def term_of(model: ReducedOrderModel, rig: Rig) -> Term:
             allowed="1 and more",
             remedy="the force on the tank cannot wait for the motion it makes; train without the present input",
         )
-    factors = TankScaling.of_facts(model.facts, rig)
-    scaled = model if factors.is_same else scaled_to(model, factors)
+    scaled, factors = model_for_tank(model, rig)
     return REDUCED_ORDER_MODEL(
         table=_table(scaled),
         sampling_rate_hz=scaled.sampling_rate_hz,
@@ -174,7 +187,8 @@ def _table(model: ReducedOrderModel) -> FloatArray:
     domain, delays = _domain_numbers(model.facts), model.delays
     break_up = () if model.break_up is None else astuple(model.break_up)
     sizes = [len(delays.inputs), len(delays.outputs), len(layers), model.theta.size, len(break_up), domain.size]
-    parts = [[network, *sizes], [*delays.inputs, *delays.outputs], layers, model.theta, break_up, domain]
+    of_network = [[*delays.inputs, *delays.outputs], layers, model.theta]
+    parts = [[network, *sizes], *of_network, break_up, domain, model.constant_regressors]
     numbers = np.concatenate([np.asarray(part, np.float64) for part in parts])
     # its own length first: the law finds the workspace behind the table by it
     return np.concatenate([[numbers.size + 1.0], numbers])
@@ -213,9 +227,10 @@ def description_of(term: Term) -> list[str]:
     parts, values = _parts(term.table), term.values
     n_in, n_out = (int(n) for n in term.table[2:4])
     memory = ", memory of whether the liquid is broken up" if parts["break_up"].size else ""
+    fill = ", the fill level among its inputs" if parts["constants"].size else ""
     lines = [
         f"model: {n_in} past velocities and {n_out} past forces, {' + '.join(f'{n:g}' for n in parts['layers'])} "
-        f"neurons{memory}, its own steps at {values['sampling_rate_hz']:g} Hz"
+        f"neurons{memory}{fill}, its own steps at {values['sampling_rate_hz']:g} Hz"
     ]
     height, mass = values["height_ratio"], values["liquid_mass_ratio"]
     if max(abs(height - 1), abs(mass - 1)) > 1e-9:

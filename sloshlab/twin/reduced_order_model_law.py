@@ -7,7 +7,8 @@ Its numbers are one flat array: the values of the force's parameters, then the t
 
     size of the table, network, n input delays, n output delays, n sizes, n parameters, n numbers of the break-up,
     n numbers of the domain,
-    input delays, output delays, sizes (neurons, or neurons of each layer), θ, break-up, domain
+    input delays, output delays, sizes (neurons, or neurons of each layer), θ, break-up, domain,
+    regressors that stay as they are (the fill level), to the end of the table
 
 and then the workspace that a simulation writes::
 
@@ -85,23 +86,38 @@ def multilayer(layers, phi, values, excited):
     return output
 
 
+@njit(error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
+def break_up_at(table):
+    """Where the numbers of the break-up begin."""
+    return N_HEADER + int(table[2]) + int(table[3]) + int(table[4]) + int(table[5])
+
+
+@njit(error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
+def n_constants(table):
+    """How many regressors that stay as they are stand behind the domain."""
+    return int(table[0]) - break_up_at(table) - int(table[6]) - int(table[7])
+
+
 @njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
 def next_output(table, lines, n_line):
     """Output, in the network's values, from the delay lines; the rest of `lines` is written."""
     network, n_in, n_out = int(table[1]), int(table[2]), int(table[3])
     n_sizes, n_theta = int(table[4]), int(table[5])
     p = n_in + n_out
+    n_phi, constants = p + n_constants(table), int(table[0]) - n_constants(table)
     delays = table[N_HEADER : N_HEADER + p]
     sizes = table[N_HEADER + p : N_HEADER + p + n_sizes]
     theta = table[N_HEADER + p + n_sizes : N_HEADER + p + n_sizes + n_theta]
-    phi = lines[2 * n_line : 2 * n_line + p]
+    phi = lines[2 * n_line : 2 * n_line + n_phi]
     for a in range(n_in):
         phi[a] = lines[int(delays[a]) - 1]
     for b in range(n_in, p):
         phi[b] = lines[n_line + int(delays[b]) - 1]
-    width = (lines.size - 2 * n_line - p) // 2
-    first = lines[2 * n_line + p : 2 * n_line + p + width]
-    second = lines[2 * n_line + p + width :]
+    for c in range(p, n_phi):
+        phi[c] = table[constants + c - p]
+    width = (lines.size - 2 * n_line - n_phi) // 2
+    first = lines[2 * n_line + n_phi : 2 * n_line + n_phi + width]
+    second = lines[2 * n_line + n_phi + width :]
     if network in (TANH, RADIAL):
         return multilayer(_Layers(network, sizes, theta), phi, first, second)
     return evaluate(network, theta, phi, first[: int(sizes[0])], second[: int(sizes[0])])
@@ -116,20 +132,15 @@ def longest_delay(table):
     return longest
 
 
-@njit(error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
-def break_up_at(table):
-    """Where the numbers of the break-up begin."""
-    return N_HEADER + int(table[2]) + int(table[3]) + int(table[4]) + int(table[5])
-
-
 @njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
 def workspace_size(table):
     """Numbers that a simulation needs behind this table."""
     p = int(table[2]) + int(table[3])
-    width = p
+    n_phi = p + n_constants(table)
+    width = n_phi
     for i in range(int(table[4])):
         width = max(width, int(table[N_HEADER + p + i]))
-    return _LINES + 2 * longest_delay(table) + p + 2 * width
+    return _LINES + 2 * longest_delay(table) + n_phi + 2 * width
 
 
 @njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]

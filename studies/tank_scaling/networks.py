@@ -14,7 +14,7 @@ from scipy.signal import butter, sosfiltfilt
 from acquisition.virtual_laboratory.shaker import STROKE_LIMIT_M
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.reduced_order_model.model import ReducedOrderModel
-from sloshlab.reduced_order_model.tank_scaling import TankScaling, scaled_to
+from sloshlab.reduced_order_model.tank_scaling import model_for_tank
 from sloshlab.rig import Liquid, Rig, Tank
 from studies.tank_scaling.campaign import Run
 from studies.tank_scaling.changes import measured
@@ -93,8 +93,7 @@ def model_for(model: ReducedOrderModel, size: float) -> ReducedOrderModel:
         Whose facts tell the tank of its training.
     size : float
     """
-    factors = TankScaling.of_facts(model.facts, rig_of_size(size))
-    return model if factors.is_same else scaled_to(model, factors)
+    return model_for_tank(model, rig_of_size(size))[0]
 
 
 def model_errors(

@@ -1,5 +1,6 @@
 """The fill level as an input: a law that depends on it is learnt between fills, kept on disk, refused beyond."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from sloshlab.reduced_order_model.fill_input import FillInput
 from sloshlab.reduced_order_model.regressors import Delays, Run
 from sloshlab.reduced_order_model.stepping import SteppedModel
 from sloshlab.reduced_order_model.storage import load_model, save_model
+from sloshlab.reduced_order_model.tank_scaling import filled_model
 from sloshlab.reduced_order_model.training import TrainingSettings, fit
 
 
@@ -90,6 +92,26 @@ def test_runs_without_a_fill_or_all_of_one_are_refused():
         FillInput(0.5, 0.2, 0.0, 1.0)
 
 
-def test_a_loop_that_cannot_tell_the_fill_refuses_the_model(model):
-    with pytest.raises(InputError, match="fill level among its regressors"):
-        SteppedModel(model.at_fill(0.5))
+def test_step_by_step_it_says_what_its_free_run_says(model):
+    x = run(0.5, 5).x[:200]
+    for fill in (0.3, 0.5):
+        stepped, said = SteppedModel(model.at_fill(fill)), []
+        for velocity in x:
+            said.append(stepped.step(velocity).sum())  # the cubic at its end: the force of the next instant
+        np.testing.assert_allclose(said[1:-1], model.at_fill(fill).simulate(x)[2:], atol=1e-12)
+
+
+def test_a_loop_must_be_told_the_fill(model):
+    with pytest.raises(InputError, match="fill level: got none"):
+        SteppedModel(model)
+
+
+def test_a_tank_of_the_training_feels_the_mass_of_its_liquid(model):
+    """A full tank of 0.3 kg: at a fill of 0.4 there are 0.12 kg, and its force is 0.4 of that on a full tank."""
+    told = replace(model, facts={"full_liquid_mass_kg": 0.3, "tank_height_m": 0.02})
+    filled, x = filled_model(told, 0.4), run(0.4, 6).x
+    assert (filled.facts["fill_level"], filled.facts["liquid_mass_kg"]) == (0.4, pytest.approx(0.12))
+    np.testing.assert_allclose(filled.simulate(x)[2:], -0.4 * 0.4**2 * x[1:-1], atol=0.02)
+    assert filled_model(filled, 0.4) is filled
+    with pytest.raises(InputError, match="full_liquid_mass_kg of its training"):
+        filled_model(model, 0.4)

@@ -11,6 +11,7 @@ import pytest
 
 from sloshlab.errors import InputError, RigError
 from sloshlab.reduced_order_model.break_up import BreakUp
+from sloshlab.reduced_order_model.fill_input import FillInput
 from sloshlab.reduced_order_model.model import ReducedOrderModel, Scaling
 from sloshlab.reduced_order_model.networks.multilayer import Multilayer
 from sloshlab.reduced_order_model.networks.network import Network
@@ -88,6 +89,44 @@ def test_open_loop_is_the_free_run_of_the_model(name: str, n_substeps: int) -> N
     expected = model.simulate(np.concatenate([np.zeros(n_rest), velocity[::3]]))[n_rest:]
     assert expected.std() > 0.01
     np.testing.assert_allclose(result.tank_force_n[::3], expected, atol=1e-11)
+
+
+OF_FILLS = {
+    "normalised": NormalisedRadialBasis(7, 5),
+    "plain": RadialBasis(7, 5),
+    "tanh": Multilayer(7, (9, 3), "tanh"),
+}
+
+
+def of_fills(network: Network) -> ReducedOrderModel:
+    """Six past velocities and the fill, trained from 0.25 to 0.75 in the tank of these tests."""
+    facts = {"tank_height_m": HEIGHT_M, "full_liquid_mass_kg": LIQUID_KG / FILL}
+    theta = 0.5 * np.random.default_rng(4).normal(size=network.n_parameters)
+    inputs, scaling = Delays(tuple(range(1, 7)), n_states=1), Scaling(0.03, 0.7, -0.2, 1.3)
+    return ReducedOrderModel(network, theta, inputs, scaling, RATE_HZ, facts, fill=FillInput(0.25, 0.75, 0.5, 0.2))
+
+
+@pytest.mark.parametrize("fill", [0.3, 0.6])
+@pytest.mark.parametrize("name", OF_FILLS)
+def test_the_fill_of_the_rig_is_what_the_network_sees(name: str, fill: float, tmp_path: Path) -> None:
+    model = of_fills(OF_FILLS[name])
+    velocity = np.random.default_rng(1).normal(size=400).cumsum() * 0.05
+    twin = Twin(None, (term_of(model, rig(fill=fill)),))
+    save_twin(twin, tmp_path / "twin.toml")
+    run = recorded(RATE_HZ, velocity=velocity, acceleration=0 * velocity)
+    force = load_twin(tmp_path / "twin.toml").simulate(run).require_done().tank_force_n
+    # φ written out: velocities, latest first, then the fill; the output is on the mass of a full tank
+    v = (np.concatenate([np.zeros(6), velocity]) - 0.03) / 0.7
+    phi = np.stack([*(v[6 - d : v.size - d] for d in range(1, 7)), np.full(velocity.size, (fill - 0.5) / 0.2)])
+    expected = fill * (1.3 * model.network.output(np, model.theta, phi) - 0.2)
+    assert expected.std() > 0.003
+    np.testing.assert_allclose(force, expected, atol=1e-11)
+    assert "the fill level among its inputs" in description_of(twin.terms[0])[0]
+
+
+def test_a_fill_beyond_the_training_is_refused() -> None:
+    with pytest.raises(InputError, match=r"allowed: 0\.25 … 0\.75"):
+        term_of(of_fills(OF_FILLS["plain"]), rig(fill=0.8))
 
 
 @pytest.mark.parametrize(("rate_hz", "n_substeps"), [(1000.0, 1), (20_000.0, 1), (997.0, 3), (60.0, 20)])
