@@ -3,27 +3,26 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from pipelines.report.progress import progress
 from pipelines.report.style import DISTINCT_COLOURS, drawing_style, new_figure, ordered_colours, png_bytes
 from pipelines.report.terminal import say
 from sloshlab import atomic_file
 from sloshlab.errors import SloshlabError
 from sloshlab.lateral_sloshing.box_tank import BoxTank, equivalent_model
-from studies.liquid_motion.shaking import FILL_LEVEL, TANK, Shaken, Shaking, shaken
+from studies.liquid_motion.kept_runs import computed
+from studies.liquid_motion.shaking import FILL_LEVEL, TANK, Shaken, Shaking
 
 FREQUENCY_HZ: Final = 10.7
 """Of the first mode of the beam."""
 LEVELS_G: Final = (1.0, 2.0, 3.0, 4.0, 5.0)
-VERTICAL_G: Final = (3.0,)
-SIDEWAYS_G: Final = (0.3, 1.0)
+VERTICAL_G: Final = (1.0, 2.0, 3.0, 5.0)
+SIDEWAYS_G: Final = (0.3, 0.6, 1.0)
 
 
 def centre_runs() -> list[Shaking]:
@@ -55,19 +54,30 @@ def centre_table(found: Mapping[Shaking, Shaken]) -> Iterator[str]:
 def plane_table(found: Mapping[Shaking, Shaken]) -> Iterator[str]:
     """What the vertical force loses and the sideways force gains when both directions move."""
     yield (
-        "| a_z | a_y | W̄, β alone | W̄, β with a_y | another start alone | Δf_y/(m_l a_y) alone | with a_z "
-        "| linear model |"
+        "| a_z | a_y | W̄, β alone | W̄, β with a_y | error of Δf_z | of another start | Δf_y/(m_l a_y) alone "
+        "| with a_z | its error, linear model |"
     )
-    yield "|---|---|---|---|---|---|---|---|"
-    model = sideways_of_linear_model()
+    yield "|---|---|---|---|---|---|---|---|---|"
     for vertical in VERTICAL_G:
         alone, other = (found[Shaking(FREQUENCY_HZ, vertical, 0.0, seed)] for seed in (0, 1))
         for level in SIDEWAYS_G:
             both, side = found[Shaking(FREQUENCY_HZ, vertical, level)], found[Shaking(FREQUENCY_HZ, 0.0, level)]
-            pairs = [f"{run.by_force[1]:.2f}, {run.by_force[0]:+.2f}" for run in (alone, both, other)]
+            pairs = [f"{run.by_force[1]:.2f}, {run.by_force[0]:+.2f}" for run in (alone, both)]
+            errors = [f"{100 * vertical_error(run, alone):.0f} %" for run in (both, other)]
             ratios = [polar(run.sideways / level) for run in (side, both)]
-            cells = [f"{vertical:g} g", f"{level:g} g", *pairs, *ratios, polar(model)]
-            yield f"| {' | '.join(cells)} |".replace("-", "−")
+            cells = [f"{vertical:g} g", f"{level:g} g", *pairs, *errors, *ratios]
+            yield f"| {' | '.join(cells)} | {100 * sideways_error(both):.0f} % |".replace("-", "−")
+
+
+def vertical_error(run: Shaken, alone: Shaken) -> float:
+    """Difference of the vertical force from that of a run without sideways motion, over the latter."""
+    return abs(run.vertical - alone.vertical) / abs(alone.vertical)
+
+
+def sideways_error(run: Shaken) -> float:
+    """Difference of the sideways force from that of the linear model, over the latter."""
+    model = sideways_of_linear_model()
+    return abs(run.sideways / run.shaking.sideways_g - model) / abs(model)
 
 
 def sideways_of_linear_model() -> complex:
@@ -77,6 +87,28 @@ def sideways_of_linear_model() -> complex:
     s = 2j * np.pi * FREQUENCY_HZ
     # force for a displacement Y of one: the acceleration is s²
     return complex(model.transfer_matrix(s)[0, 0] / (tank.liquid_mass_kg * s**2) + 1)
+
+
+def superposition_figure(found: Mapping[Shaking, Shaken]) -> bytes:
+    """Errors of both forces, added as if each direction were alone, over the vertical level, as PNG."""
+    with drawing_style():
+        figure = new_figure(3.0)
+        left, right = figure.subplots(1, 2, sharex=True)
+        for colour, level in zip(DISTINCT_COLOURS, SIDEWAYS_G, strict=False):
+            both = [found[Shaking(FREQUENCY_HZ, vertical, level)] for vertical in VERTICAL_G]
+            alone = [found[Shaking(FREQUENCY_HZ, vertical)] for vertical in VERTICAL_G]
+            errors = [100 * vertical_error(*pair) for pair in zip(both, alone, strict=True)]
+            left.plot(VERTICAL_G, errors, "o-", color=colour, label=f"{level:g} g sideways")
+            right.plot(VERTICAL_G, [100 * sideways_error(run) for run in both], "o-", color=colour)
+        starts = [
+            100 * vertical_error(found[Shaking(FREQUENCY_HZ, v, 0.0, 1)], found[Shaking(FREQUENCY_HZ, v)])
+            for v in VERTICAL_G
+        ]
+        left.plot(VERTICAL_G, starts, "k--", label="another start")
+        left.set(xlabel="vertical level [g]", ylabel="vertical force [%]", ylim=(0, None))
+        right.set(xlabel="vertical level [g]", ylabel="sideways force [%]", ylim=(0, None))
+        figure.legend(loc="outside upper center", ncols=4)
+        return png_bytes(figure)
 
 
 def polar(value: complex) -> str:
@@ -121,27 +153,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     wanted = list(dict.fromkeys([*centre_runs(), *plane_runs()]))
     try:
-        found: dict[Shaking, Shaken] = {}
-        with progress("shaken tanks", len(wanted)) as done:
-            for shaking in wanted:
-                found[shaking] = shaken(shaking)
-                done(f"{shaking.vertical_g:g} g up, {shaking.sideways_g:g} g sideways")
-        with atomic_file.filled_folder(given.folder) as complete:
-            lines = [*centre_table(found), "", *plane_table(found)]
-            (complete / "tables.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
-            numbers = json.dumps([_plain(run) for run in found.values()], indent=1)
-            (complete / "liquid_motion.json").write_text(numbers + "\n", encoding="utf-8")
-            (complete / "liquid_centre.png").write_bytes(centre_figure(found))
+        found = computed(given.folder / "runs", wanted)
+        lines = [*centre_table(found), "", *plane_table(found)]
+        atomic_file.write_bytes(given.folder / "tables.md", ("\n".join(lines) + "\n").encode())
+        atomic_file.write_bytes(given.folder / "liquid_centre.png", centre_figure(found))
+        atomic_file.write_bytes(given.folder / "superposition.png", superposition_figure(found))
     except SloshlabError as error:
         say(f"liquid_motion: {error}", error=True)
         return 1
     say(f"{given.folder / 'tables.md'}")
     return 0
-
-
-def _plain(run: Shaken) -> dict[str, Any]:
-    phasors = {name: getattr(run, name) for name in ("vertical", "sideways", "centre")}
-    return {**vars(run.shaking), **{name: [value.real, value.imag] for name, value in phasors.items()}}
 
 
 if __name__ == "__main__":

@@ -69,11 +69,12 @@ def test_a_fill_that_was_left_out_gets_the_force_of_its_damper(folder: Path, tmp
     assert len(model.facts["training"]) == 3
     time = np.arange(128 * 6) / 128.0
     omega = 2 * np.pi * 10.0
-    motion = recorded(128.0, velocity=1.5 * 9.81 / omega * np.sin(omega * time))
+    velocity = 1.5 * 9.81 / omega * np.sin(omega * time)
+    motion = recorded(128.0, velocity=velocity)
     rig = Rig.from_toml(folder / "rig_0.6.toml")
     result = Twin(None, (term_of(model, rig),)).simulate(motion).require_done()
     late = time > 0.5
-    force, velocity = result.tank_force_n[late], motion.velocity_m_per_s[late]
+    force, velocity = result.tank_force_n[late], velocity[late]
     # in phase with the velocity: −c of a fill that no run had, in newtons of the liquid that is there
     assert force @ velocity / (velocity @ velocity) == pytest.approx(-damping_kg_per_s(0.6), rel=0.08)
     for fill in (0.2, 0.85):
