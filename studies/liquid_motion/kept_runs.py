@@ -61,8 +61,8 @@ def _kept(folder: Path, shaking: Shaking) -> Shaken | None:
         content = json.loads((folder / f"{_identity(shaking)[:16]}.json").read_bytes())
         if content["identity"] != _identity(shaking):
             return None
-        phasors = (complex(*content[name]) for name in _PHASORS)
-        last = (np.array(content[name], np.float64) for name in ("phase", "centre_over_height"))
-        return Shaken(shaking, *phasors, *last, float(content["liquid_mass_kg"]))
+        vertical, sideways, centre = (complex(*content[name]) for name in _PHASORS)
+        phase, heights = (np.array(content[name], np.float64) for name in ("phase", "centre_over_height"))
+        return Shaken(shaking, vertical, sideways, centre, phase, heights, float(content["liquid_mass_kg"]))
     except (OSError, ValueError, KeyError, TypeError):
         return None
