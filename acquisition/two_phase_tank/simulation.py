@@ -18,6 +18,7 @@ from acquisition.two_phase_tank.energy import TwoPhaseAccount
 from acquisition.two_phase_tank.fields import Constants, Flow, State, room
 from acquisition.two_phase_tank.pressure import Pressure
 from acquisition.two_phase_tank.setup import TwoPhaseSetup
+from acquisition.two_phase_tank.sums import stored_energy
 from acquisition.two_phase_tank.transport import find_density
 from sloshlab.errors import InputError
 
@@ -96,7 +97,7 @@ class TwoPhaseTank:
         self._start = self._stored()
 
     def _stored(self) -> tuple[float, float, float]:
-        kinetic, potential, surface = stepping.stored_energy(self._state, self._work, self._constants)
+        kinetic, potential, surface = stored_energy(self._state, self._work, self._constants)
         return float(kinetic), float(potential), float(surface)
 
     def set_fractions(self, liquid_fraction: ArrayLike) -> None:

@@ -207,7 +207,6 @@ def interface_forces(state, work, body, k_):  # type: ignore[no-untyped-def]
     us, ws, uc, wc, bx, bz = work.us, work.ws, work.uc, work.wc, work.bx, work.bz
     uz, wz = work.uz, work.wz
     nx, nz = c.shape
-    us[:], ws[:], uc[:], wc[:], uz[:], wz[:] = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     jump, sigma, dx, dz = k_.rho_l - k_.rho_g, k_.sigma, k_.dx, k_.dz
     _find_places(c, work.mx, work.mz, work.alpha, ox, oz)
     kappa[:] = _UNKNOWN
@@ -216,23 +215,27 @@ def interface_forces(state, work, body, k_):  # type: ignore[no-untyped-def]
     for i in range(1, nx):
         for k in range(nz):
             difference = c[i, k] - c[i - 1, k]
-            if difference != 0.0:
-                along, up = _place(ox[i - 1, k], oz[i - 1, k], ox[i, k], oz[i, k], 0.5, 0.0)
-                ax, az = body_at(body, i * dx, (k + 0.5) * dz)
-                uc[i, k] = sigma * _between(kappa[i - 1, k], kappa[i, k]) * difference / dx * bx[i, k]
-                across = -jump * difference / dx * bx[i, k]
-                uz[i, k] = across * up * dz
-                us[i, k] = uc[i, k] + across * ax * along * dx + az * uz[i, k]
+            if difference == 0.0:
+                us[i, k] = uc[i, k] = uz[i, k] = 0.0
+                continue
+            along, up = _place(ox[i - 1, k], oz[i - 1, k], ox[i, k], oz[i, k], 0.5, 0.0)
+            ax, az = body_at(body, i * dx, (k + 0.5) * dz)
+            gradient = difference / dx * bx[i, k]
+            uc[i, k] = sigma * _between(kappa[i - 1, k], kappa[i, k]) * gradient
+            uz[i, k] = -jump * gradient * up * dz
+            us[i, k] = uc[i, k] - jump * gradient * ax * along * dx + az * uz[i, k]
     for i in range(nx):
         for k in range(1, nz):
             difference = c[i, k] - c[i, k - 1]
-            if difference != 0.0:
-                along, up = _place(ox[i, k - 1], oz[i, k - 1], ox[i, k], oz[i, k], 0.0, 0.5)
-                ax, az = body_at(body, (i + 0.5) * dx, k * dz)
-                wc[i, k] = sigma * _between(kappa[i, k - 1], kappa[i, k]) * difference / dz * bz[i, k]
-                across = -jump * difference / dz * bz[i, k]
-                wz[i, k] = across * up * dz
-                ws[i, k] = wc[i, k] + across * ax * along * dx + az * wz[i, k]
+            if difference == 0.0:
+                ws[i, k] = wc[i, k] = wz[i, k] = 0.0
+                continue
+            along, up = _place(ox[i, k - 1], oz[i, k - 1], ox[i, k], oz[i, k], 0.0, 0.5)
+            ax, az = body_at(body, (i + 0.5) * dx, k * dz)
+            gradient = difference / dz * bz[i, k]
+            wc[i, k] = sigma * _between(kappa[i, k - 1], kappa[i, k]) * gradient
+            wz[i, k] = -jump * gradient * up * dz
+            ws[i, k] = wc[i, k] - jump * gradient * ax * along * dx + az * wz[i, k]
 
 
 @njit(cache=True, error_model="numpy")

@@ -206,10 +206,9 @@ def find_density(c, work, k_):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def transport(state, work, dt, x_first, k_):  # type: ignore[no-untyped-def]
-    """Carry liquid and momenta for dt with the velocity at its start; return the liquid clipped, in cells."""
+    """Carry liquid and momenta for dt with the velocities u0, w0; return the liquid clipped, in cells."""
     c = state.c
     nx, nz = c.shape
-    work.u0[:], work.w0[:] = state.u, state.w
     for i in range(nx):
         for k in range(nz):
             work.centre[i, k] = 1.0 if c[i, k] > 0.5 else 0.0
