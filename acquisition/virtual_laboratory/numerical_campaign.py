@@ -1,4 +1,4 @@
-"""The campaign of the numerical tank: hours of computing, in processes, that may be stopped at any time.
+"""The campaign of a computed liquid: hours of computing, in processes, that may be stopped at any time.
 
 Started again it keeps the recordings that the manifest vouches for and goes on with the others from their
 checkpoints. The bytes of a recording depend on its run, the seed and the resolution only.
@@ -24,6 +24,8 @@ import xarray as xr
 from acquisition.numerical_tank import checkpoint as checkpoints
 from acquisition.numerical_tank.instability import STOPPED
 from acquisition.numerical_tank.tank import TankSetup
+from acquisition.two_phase_tank import checkpoint as two_phase_checkpoint
+from acquisition.two_phase_tank.setup import TwoPhaseSetup
 from acquisition.virtual_laboratory.campaign import (
     CAMPAIGN_LABORATORY,
     MANIFEST_NAME,
@@ -31,7 +33,7 @@ from acquisition.virtual_laboratory.campaign import (
     file_record,
     laboratory_option,
 )
-from acquisition.virtual_laboratory.numerical_liquid import NumericalLiquid, numerical_setup
+from acquisition.virtual_laboratory.numerical_liquid import NumericalLiquid, numerical_setup, two_phase_setup
 from acquisition.virtual_laboratory.numerical_runs import RIG_TEXTS, NumericalRun, numerical_runs
 from acquisition.virtual_laboratory.shaker_run import START_TIME_UTC, virtual_shaker_run, write_virtual_run
 from acquisition.virtual_laboratory.structure_rig import structure_laboratory
@@ -48,7 +50,7 @@ from sloshlab.recording import read_attributes
 from sloshlab.rig import Rig
 
 CHECKPOINTS_NAME: Final = ".checkpoints"
-COMMAND: Final = "sloshlab virtual campaign --liquid numerical -o raw_data/numerical_tank --layers {} --seed {}"
+COMMAND: Final = "sloshlab virtual campaign --liquid {} -o raw_data/{} --layers {} --seed {}"
 _SAMPLING_RATE_HZ: Final = 512.0
 _FIRST_SEED: Final = 500
 """Other seeds than those of the campaign whose liquid follows a law."""
@@ -65,7 +67,8 @@ class CampaignSettings:
     seed : int
         Of noise, motion and liquid.
     layers_per_height : int
-        Resolution: height of the tank over the distance of the particles; half as fine again at α = 0.25.
+        Resolution: height of the tank over the distance of the particles, or over the side of a cell; half as fine
+        again at α = 0.25.
     n_workers : int
         Processes.
     only : str
@@ -76,6 +79,9 @@ class CampaignSettings:
         Of the laboratory that serves all runs; None for one that is as the rigs tell.
     overwrite : bool
         Whether recordings may be replaced that the manifest does not name.
+    with_gas : bool
+        Whether liquid and gas are computed on a grid; else the liquid alone as particles. Only the runs on the
+        shaker are then made: a structure carries particles.
     """
 
     seed: int = 0
@@ -85,6 +91,7 @@ class CampaignSettings:
     checkpoints: str | os.PathLike[str] | None = None
     laboratory_seed: int | None = CAMPAIGN_LABORATORY
     overwrite: bool = False
+    with_gas: bool = False
 
 
 @dataclass(frozen=True)
@@ -136,6 +143,7 @@ class _Task:
     seed: int
     layers_per_height: int
     laboratory_seed: int | None
+    with_gas: bool
 
 
 def make_numerical_campaign(
@@ -207,6 +215,7 @@ def _as_task(task: _Task) -> Task:
         "seed": task.seed,
         "layers_per_height": task.layers_per_height,
         "laboratory_seed": task.laboratory_seed,
+        "with_gas": task.with_gas,
     }
     return Task(task.run.name, "acquisition.virtual_laboratory.numerical_campaign:record_told_run", arguments)
 
@@ -232,6 +241,7 @@ def record_told_run(arguments: Mapping[str, Any], say_share: Callable[[float], N
         arguments["seed"],
         arguments["layers_per_height"],
         arguments["laboratory_seed"],
+        arguments["with_gas"],
     )
     return record(task, say_share)
 
@@ -244,10 +254,14 @@ def record(task: _Task, progress: Callable[[float], None]) -> dict[str, Any]:
     dict
         ``computing_s`` and ``flag``.
     """
-    _discard_if_damaged(task.checkpoint)
+    _discard_if_damaged(task)
     start_s, computed = time.monotonic(), list[float]()
     liquid = NumericalLiquid(
-        task.layers_per_height, task.checkpoint, progress, lambda force: computed.append(force.computing_s)
+        task.layers_per_height,
+        task.checkpoint,
+        progress,
+        lambda force: computed.append(force.computing_s),
+        task.with_gas,
     )
     recording = _recording(task, liquid)
     write_virtual_run(recording, task.recording)
@@ -257,11 +271,12 @@ def record(task: _Task, progress: Callable[[float], None]) -> dict[str, Any]:
     return {"computing_s": computing_s, "flag": str(recording.attrs.get(STOPPED, ""))}
 
 
-def _discard_if_damaged(checkpoint: Path) -> None:
+def _discard_if_damaged(task: _Task) -> None:
     """A run whose checkpoint cannot be read starts again; the campaign goes on."""
+    checkpoint = task.checkpoint
     if checkpoint.exists():
         try:
-            checkpoints.load(checkpoint)
+            (two_phase_checkpoint if task.with_gas else checkpoints).load(checkpoint)
         except InputError:
             # the run starts again; one damaged file must not stop a campaign of hours
             checkpoint.unlink()
@@ -375,8 +390,7 @@ class _Manifest:
         self._files.update({name: file_record(self._folder / name) for name in RIG_TEXTS})
         content = {
             "format": 1,
-            "command": COMMAND.format(self._settings.layers_per_height, self._settings.seed)
-            + laboratory_option(self._settings.laboratory_seed),
+            "command": _command(self._settings),
             "seed": self._settings.seed,
             "layers_per_height": self._settings.layers_per_height,
             "sloshlab_version": __version__,
@@ -387,6 +401,13 @@ class _Manifest:
 
     def _relative(self, path: Path) -> str:
         return path.relative_to(self._folder).as_posix()
+
+
+def _command(settings: CampaignSettings) -> str:
+    """The command that makes the same campaign."""
+    names = ("two_phase", "two_phase_tank") if settings.with_gas else ("numerical", "numerical_tank")
+    made = COMMAND.format(*names, settings.layers_per_height, settings.seed)
+    return made + laboratory_option(settings.laboratory_seed)
 
 
 def _is_of(task: _Task) -> bool:
@@ -404,6 +425,8 @@ def _tasks(folder: Path, settings: CampaignSettings, runs: Sequence[NumericalRun
         if number < 0:
             raise InputError(f"{name} of the campaign", got=str(number), allowed="≥ 0")
     chosen = [run for run in runs if fnmatch.fnmatchcase(run.name, settings.only)]
+    if settings.with_gas:
+        chosen = [run for run in chosen if run.is_on_shaker]
     if not chosen:
         names = ", ".join(run.name for run in runs[:2])
         raise InputError("--only", got=repr(settings.only), allowed=f"a pattern of names such as {names}")
@@ -419,6 +442,7 @@ def _task(folder: Path, settings: CampaignSettings, run: NumericalRun) -> _Task:
         1000 * settings.seed + _FIRST_SEED + run.number,
         _layers_per_height(settings, run),
         settings.laboratory_seed,
+        settings.with_gas,
     )
     kept_in = Path(settings.checkpoints or folder / CHECKPOINTS_NAME)
     # the hash in the name, so that a checkpoint of other settings is not taken up, nor lost
@@ -432,22 +456,24 @@ def _layers_per_height(settings: CampaignSettings, run: NumericalRun) -> int:
     return max(settings.layers_per_height, math.ceil(_SHALLOWEST_FILL * settings.layers_per_height / fill_level))
 
 
-def _setup(task: _Task) -> TankSetup | None:
-    """The numerical tank of a run; None where no liquid moves."""
+def _setup(task: _Task) -> TankSetup | TwoPhaseSetup | None:
+    """The computed tank of a run; None where no liquid moves."""
     if not task.run.is_computed:
         return None
-    return numerical_setup(
-        Rig.from_toml_text(RIG_TEXTS[task.run.rig]),
-        layers_per_height=task.layers_per_height,
-        seed=task.seed,
-        sampling_rate_hz=_SAMPLING_RATE_HZ,
-    )
+    rig = Rig.from_toml_text(RIG_TEXTS[task.run.rig])
+    common: dict[str, Any] = {"seed": task.seed, "sampling_rate_hz": _SAMPLING_RATE_HZ}
+    if task.with_gas:
+        return two_phase_setup(rig, cells_per_height=task.layers_per_height, **common)
+    return numerical_setup(rig, layers_per_height=task.layers_per_height, **common)
 
 
 def _cost(task: _Task) -> float:
-    """Steps of particles, about proportional to the time of computing."""
+    """Steps of particles or cells, about proportional to the time of computing."""
     setup, duration_s = _setup(task), float(task.run.settings["duration_s"])
-    return duration_s * (1e4 if setup is None else setup.n_particles / setup.step_s)
+    if setup is None:
+        return duration_s * 1e4
+    n = setup.n_along * setup.n_up if isinstance(setup, TwoPhaseSetup) else setup.n_particles
+    return duration_s * n / setup.step_s
 
 
 def _made_of(task: _Task) -> str:

@@ -7,7 +7,7 @@ import json
 import tempfile
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -289,7 +289,8 @@ def make_campaign_folder(
     Parameters
     ----------
     folder : Path
-    liquid : {'law', 'numerical'}
+    liquid : {'law', 'numerical', 'two_phase'}
+        With its gas only what is on the shaker is made.
     settings : CampaignSettings
     say : callable
         Takes a line for every computed run.
@@ -297,9 +298,8 @@ def make_campaign_folder(
         Of a cluster that computes instead of processes of this machine.
     """
     _check_liquid(liquid)
-    if liquid == "two_phase":
-        raise InputError("--liquid", got="two_phase for a campaign", allowed="law, numerical")
-    if liquid == "numerical":
+    if liquid != "law":
+        settings = replace(settings, with_gas=liquid == "two_phase")
         executor = executor_of(Where(scheduler, settings.n_workers, fresh=True), said=warn)
         return _make_numerical_campaign_folder(folder, settings, say, executor)
     with progress("campaign", 40) as advance:

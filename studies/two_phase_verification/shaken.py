@@ -168,7 +168,9 @@ MAP: Final = (
     Shaking(2.0, 18.0, 36),
 )
 COARSE: Final = tuple(replace(case, cells_per_height=16) for case in MAP)
-RESOLUTION: Final = tuple(Shaking(2.04, 10.7, 30, cells_per_height=cells) for cells in (16, 24, 32, 48))
+RESOLUTION: Final = tuple(
+    Shaking(2.04, 10.7, 30, cells_per_height=cells, seed=seed) for cells in (16, 24, 32, 48) for seed in (0, 1, 2)
+)
 _WEAK: Final = (Shaking(0.5, 11.4, 100, 16), Shaking(1.0, 11.4, 60, 16))
 CAUSES: Final = (
     *(replace(case, layer_frequency_hz=case.frequency_hz / 2) for case in _WEAK),
@@ -180,7 +182,12 @@ CAUSES: Final = (
     Shaking(4.0, 11.4, 30, 16, seed=1),
     Shaking(4.0, 11.4, 30, 16, gas_density_kg_per_m3=0.12),
 )
-POINTS: Final = {"map": MAP, "coarse": COARSE, "resolution": RESOLUTION, "causes": CAUSES}
+CAMPAIGN: Final = tuple(
+    Shaking(level_g, frequency_hz, 48 if level_g <= 1.0 else 24, 16)
+    for level_g in (4.0, 2.0, 1.0, 0.5, 3.0, 6.0, 1.5, 5.0)
+    for frequency_hz in (8.0, 9.5, 11.0, 12.5, 14.5, 18.0)
+)
+POINTS: Final = {"map": MAP, "coarse": COARSE, "resolution": RESOLUTION, "causes": CAUSES, "campaign": CAMPAIGN}
 """What can be computed, by name; the causes change one thing at a time on the coarse grid."""
 
 

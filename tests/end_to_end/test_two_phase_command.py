@@ -17,10 +17,10 @@ def test_a_structure_carries_particles_only(tmp_path: Path, capsys: Any) -> None
     refusal(capsys, [*command, "-o", str(output)], output, "two_phase for sdof_free", "take numerical")
 
 
-def test_a_campaign_has_no_such_liquid(tmp_path: Path, capsys: Any) -> None:
+def test_a_campaign_on_structures_has_no_such_liquid(tmp_path: Path, capsys: Any) -> None:
     output = tmp_path / "folder"
-    command = ["virtual", "campaign", "--liquid", "two_phase", "-o", str(output)]
-    refusal(capsys, command, output, "two_phase for a campaign", "law, numerical")
+    command = ["virtual", "campaign", "--liquid", "two_phase", "--only", "beam/*", "-o", str(output)]
+    refusal(capsys, command, output, "--only: got 'beam/*'")
 
 
 @pytest.mark.parametrize(("layers", "told"), [("5", "cells over the height"), ("9000", "cells: got")])

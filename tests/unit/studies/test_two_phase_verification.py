@@ -8,15 +8,30 @@ import pytest
 import studies.two_phase_verification as room
 from acquisition.two_phase_tank.setup import Fluids
 from studies.two_phase_verification import cases, shaken
+from studies.two_phase_verification.linear_theory import Layers
 
 KEPT = Path(room.__file__).with_name("shaken.json")
 
 
-def test_growth_of_a_mathieu_wave_is_that_of_first_order() -> None:
-    """At Ω = 2ω₀ a wave grows with s ω₀/4 − γ to first order; without shaking it decays with γ."""
-    assert cases.growth_rate(100.0, 0.3, 0.0, 20.0) == pytest.approx(-0.3, rel=1e-6)
-    assert cases.growth_rate(100.0, 0.0, 0.02, 20.0) == pytest.approx(0.02 * 10 / 4, rel=1e-3)
-    assert cases.growth_rate(100.0, 0.05, 0.02, 20.0) == pytest.approx(0.0, abs=1e-4)
+def test_viscous_wave_of_deep_water_is_lamb_s_with_the_next_term() -> None:
+    """Lamb art. 349, expanded: γ = 2νk² (1 − √(θ/2)), ω = ω₀ (1 − √2 θ^1.5) with θ = νk²/ω₀."""
+    k, nu = 50.0, 1e-5
+    fluids = Fluids(
+        viscosity_m2_per_s=nu, gas_density_kg_per_m3=1e-4, gas_viscosity_m2_per_s=1e-9, surface_tension_n_per_m=0.0
+    )
+    omega, decay = Layers(fluids, k, 1.0, 1.0).free_wave()
+    plain = (9.81 * k) ** 0.5
+    theta = nu * k**2 / plain
+    assert decay / (2 * nu * k**2) - 1 == pytest.approx(-((theta / 2) ** 0.5), rel=0.03)
+    assert omega / plain - 1 == pytest.approx(-(2**0.5) * theta**1.5, rel=0.03)
+
+
+def test_threshold_is_that_of_a_damped_mathieu_equation() -> None:
+    """ζ̈ + 2γ ζ̇ + ω² (1 + (a/g) cos 2ωt) ζ = 0 grows from a = 4γ g/ω on, to first order."""
+    fluids = Fluids(viscosity_m2_per_s=1e-5, gas_density_kg_per_m3=1e-4, surface_tension_n_per_m=0.0)
+    layers = Layers(fluids, 50.0, 1.0, 1.0)
+    omega, decay = layers.free_wave()
+    assert layers.subharmonic_threshold(2 * omega) == pytest.approx(4 * decay * 9.81 / omega, rel=0.01)
 
 
 def test_wave_frequency_without_gas_and_tension_is_that_of_deep_water() -> None:
