@@ -330,8 +330,10 @@ class ModelSelection:
 
         Of what lacks where nothing is added a law may leave a tenth of the amplitude.
         """
-        nothing, best = self.fits[frozenset()], min(self.fits.values(), key=lambda fit: fit.cost)
-        left = []
+        nothing, left = self.fits.get(frozenset()), []
+        if nothing is None:
+            return lambda inflation: np.inf
+        best = min(self.fits.values(), key=lambda fit: fit.cost)
         for fit in (nothing, best):
             problem = self.runs.problem_of(fit)
             theta = problem.theta_of(fit.values)
