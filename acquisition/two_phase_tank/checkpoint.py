@@ -17,7 +17,7 @@ from acquisition.two_phase_tank.setup import Fluids, GridNumerics, TwoPhaseSetup
 from acquisition.two_phase_tank.simulation import TwoPhaseTank
 from sloshlab.errors import InputError
 
-MAGIC: Final = b"sloshlab two-phase tank checkpoint, version 1\n"
+MAGIC: Final = b"sloshlab two-phase tank checkpoint, version 2\n"
 _EXTRA: Final = "extra_"
 _PARTS: Final = {
     "box": Box,

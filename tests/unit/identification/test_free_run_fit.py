@@ -418,3 +418,13 @@ def test_derivatives_that_are_wrong_are_made_anew_in_every_stage(tmp_path: Path)
     begun = FreeRunFit((), start, 0.0, 0.0)
     assert inflated_cost(problem, begun, inflation) > 10 * least
     assert inflated_cost(problem, fit, inflation) < 1.01 * least
+
+
+def test_a_fit_is_given_up_where_its_steps_cannot_reach_what_is_asked(tmp_path: Path) -> None:
+    """One that can reach it goes on to the same optimum by the same simulations."""
+    runs, free = decays(duration_s=1.5), [FREQUENCY, LOSS]
+    whole, _ = fitted(problem_of(tmp_path, runs, [], free), {})
+    within, _ = fitted(problem_of(tmp_path, runs, [], free), {}, hopeless_cost=lambda inflation: 2.0 * whole.cost)
+    assert (within.values, within.n_simulations) == (whole.values, whole.n_simulations)
+    beyond, _ = fitted(problem_of(tmp_path, runs, [], free), {}, hopeless_cost=lambda inflation: 0.0)
+    assert beyond.n_simulations < whole.n_simulations
