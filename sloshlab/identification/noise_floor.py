@@ -3,26 +3,24 @@ repeats."""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
-from scipy.signal import welch
 
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.case import Case, CaseRun
 from sloshlab.identification.diagnosed_model import DiagnosedModel
+from sloshlab.identification.drive_noise import NoiseSpectrum, noise_spectrum
 from sloshlab.identification.free_run_fit import fitted
 from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.identification.observations import (
     IGNORED_VARIANCE,
     Observation,
-    noise_of_sensor,
     observations,
     slow_displacements,
     with_scatter,
@@ -43,10 +41,6 @@ _SLOW_DISPLACEMENT_ERROR: Final = 3.0
 """Standard deviations by noise to which a slow displacement is known after the removal of drift."""
 _RELATIVE_REACH: Final = 0.05
 """Of a frequency, by which a resonance may be elsewhere: twice the bound of a mode, as an effect moves it, too."""
-_MOST_OF_STATED: Final = 2.0
-"""Over a sensor's noise: drives of repeats that differ by more were not the same."""
-_SECONDS_OF_A_SPECTRUM: Final = 4.0
-_FEWEST_LINES: Final = 3
 
 
 def weighted_observations(case: Case, model: DiagnosedModel) -> dict[str, list[Observation]]:
@@ -126,7 +120,7 @@ def _noise_of_drives(
 
     At a resonance it is narrow, and two repeats estimate it to a factor of two or three only. It is computed by
     simulations whose drive has as much noise once more, with the spectrum that repeats tell
-    (`_spectrum_of_drive_noise`). Of several that drive together each may have to do so alone, beside an effect on
+    (`noise_spectrum`). Of several that drive together each may have to do so alone, beside an effect on
     the others, and the noisiest counts.
     """
     # A twin of a user's own cannot be asked what the noise of its drive makes of its channels.
@@ -135,7 +129,7 @@ def _noise_of_drives(
     squares: dict[tuple[str, str], FloatArray] = {}
     draws: dict[tuple[str, str], FloatArray] = {}
     spectrum_of = {
-        name: _spectrum_of_drive_noise(case, name)
+        name: noise_spectrum(case.tests(), name)
         for run in case.runs
         for name in model.driving(run)
         if not run.is_free
@@ -190,71 +184,10 @@ def _ignored_where_drive_noise_dominates(
     return replace(observation, variance=variance, ignored=ignored)
 
 
-@dataclass(frozen=True, eq=False)
-class _NoiseSpectrum:
-    """Spectrum of a sensor's noise over that of white noise of the same sensor, at least one.
-
-    Attributes
-    ----------
-    frequencies_hz, ratios : array, shape (n,)
-    """
-
-    frequencies_hz: FloatArray
-    ratios: FloatArray
-
-    def coloured(self, white: FloatArray, rate_hz: float) -> FloatArray:
-        """White noise filtered to have this spectrum, shape (n,)."""
-        at = np.interp(np.fft.rfftfreq(white.size, 1 / rate_hz), self.frequencies_hz, self.ratios)
-        return np.asarray(np.fft.irfft(np.fft.rfft(white) * np.sqrt(at), white.size))
-
-
-_WHITE: Final = _NoiseSpectrum(np.zeros(1), np.ones(1))
-
-
-def _spectrum_of_drive_noise(case: Case, name: str) -> _NoiseSpectrum:
-    """Spectrum of a driving sensor's noise, from repeats whose drives differ by no more than noise.
-
-    Noise of accelerometers and amplifiers grows towards low frequencies, where structures resonate (two to ten
-    times the stated density there); the stated noise, or that of the quietest bands, is that of high frequencies.
-    """
-    ratios: list[FloatArray] = []
-    frequencies: FloatArray = np.zeros(1)
-    for test in case.tests():
-        # Only repeats tell noise from motion; runs of other tests move otherwise.
-        for first, other in itertools.pairwise(run for run in test if name in run.recording and not run.is_free):
-            rate = first.attributes.sampling_rate_hz
-            a, b = (np.asarray(run.recording[name].values, np.float64) for run in (first, other))
-            std = max(noise_of_sensor(first, name), noise_of_sensor(other, name))
-            if a.size != b.size or rate != other.attributes.sampling_rate_hz or not std > 0:
-                continue
-            # The signal of repeats cancels; the noise of two independent readings adds.
-            difference = (a - b) / np.sqrt(2)
-            # Drives that were not repeated exactly would be taken for noise.
-            if not np.isfinite(difference).all() or difference.std() > _MOST_OF_STATED * std:
-                continue
-            n = min(a.size, round(_SECONDS_OF_A_SPECTRUM * rate))
-            frequency, density = welch(difference, rate, nperseg=n)
-            if ratios and density.shape != ratios[0].shape:
-                continue
-            frequencies = frequency
-            # 2σ²/f_s is the one-sided density of white noise of this standard deviation.
-            ratios.append(density / (2 * std**2 / rate))
-    if not ratios:
-        return _WHITE
-    mean = np.mean(ratios, axis=0)
-    # Averaged over an octave: a periodogram of few segments scatters by its own size.
-    low = np.minimum(np.searchsorted(frequencies, frequencies / np.sqrt(2)), frequencies.size - _FEWEST_LINES)
-    high = np.maximum(np.searchsorted(frequencies, frequencies * np.sqrt(2)), low + _FEWEST_LINES)
-    sums = np.concatenate([[0.0], np.cumsum(mean)])
-    high = np.minimum(high, mean.size)
-    # Never below one: the stated noise, that of high frequencies, is the least.
-    return _NoiseSpectrum(frequencies, np.maximum((sums[high] - sums[low]) / (high - low), 1.0))
-
-
 def _propagated_noise(
     case: Case,
     run: CaseRun,
-    driving: Mapping[str, _NoiseSpectrum],
+    driving: Mapping[str, NoiseSpectrum],
     *,
     plain: dict[str, list[Observation]],
     fit: FreeRunFit,
@@ -266,7 +199,6 @@ def _propagated_noise(
     """
     if case.rig is None or any(run.recording[name].attrs["quantity"] != "acceleration" for name in driving):
         return {}
-    rate = run.attributes.sampling_rate_hz
     drawn: dict[tuple[str, str], list[FloatArray]] = {}
     with suppress(SloshlabError):
         # The recorded drive has its noise already, in a draw that nobody knows. As much noise once more changes
@@ -275,12 +207,7 @@ def _propagated_noise(
         # Fixed seeds: the same case gives the same answer.
         for seed in range(_N_NOISE_DRAWS):
             generator = np.random.default_rng(seed)
-            noise = {
-                name: spectrum.coloured(
-                    noise_of_sensor(run, name) * generator.standard_normal(run.recording[name].size), rate
-                )
-                for name, spectrum in driving.items()
-            }
+            noise = {name: spectrum.drawn(run, name, generator) for name, spectrum in driving.items()}
             noisier = run.recording.assign(
                 {name: run.recording[name].copy(data=run.recording[name].values + noise[name]) for name in noise}
             )

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.case import CaseRun
 from sloshlab.identification.diagnosed_model import EXACT, DiagnosedModel, Readings
-from sloshlab.identification.observations import Observation, noise_of_sensor
+from sloshlab.identification.drive_noise import NoiseSpectrum, noise_spectrum
+from sloshlab.identification.observations import Observation
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_physics.candidate import Candidate, extension_of
 
@@ -35,10 +36,12 @@ class DivergingMotions:
     ----------
     model : DiagnosedModel
         Nothing is known of the drives of a user's own twin, whose simulations are taken as exact.
+    tests : sequence of sequences of str, optional
+        Names of the runs of every test: repeats tell the spectrum of the noise of drives.
     """
 
-    def __init__(self, model: DiagnosedModel) -> None:
-        self._model = model
+    def __init__(self, model: DiagnosedModel, tests: Sequence[Sequence[str]] = ()) -> None:
+        self._model, self._tests = model, tests
 
     @cached_property
     def _noisy(self) -> list[tuple[RigModel, dict[str, CaseRun]]]:
@@ -46,10 +49,14 @@ class DivergingMotions:
         if not isinstance(self._model, RigModel):
             return []
         found = []
+        by_name = {run.name: run for run in self._model.runs}
+        tests = [[by_name[name] for name in test if name in by_name] for test in self._tests]
+        driving = dict.fromkeys(name for run in self._model.runs for name in self._model.driving(run))
+        spectra = {name: noise_spectrum(tests, name) for name in driving}
         # Fixed seeds: the same case gives the same answer.
         for seed in range(_N_DRAWS):
             generator = np.random.default_rng(seed)
-            runs = [_with_noise(run, self._model.driving(run), generator) for run in self._model.runs]
+            runs = [_with_noise(run, self._model.driving(run), spectra, generator) for run in self._model.runs]
             # A model of its own, as drives are kept by the name of a run; no motion is asked for twice.
             model = RigModel(
                 self._model.rig, self._model.folder, runs, executor=self._model.executor, most_kept_bytes=0.0
@@ -104,12 +111,14 @@ def _difference(observation: Observation, plain: Readings, drawn: Readings) -> F
     return np.asarray(difference / np.sqrt(observation.variance))
 
 
-def _with_noise(run: CaseRun, driving: Sequence[str], generator: np.random.Generator) -> CaseRun:
+def _with_noise(
+    run: CaseRun, driving: Sequence[str], spectra: Mapping[str, NoiseSpectrum], generator: np.random.Generator
+) -> CaseRun:
     if run.is_free:
         return run
     noisy = {}
     for name in driving:
         channel = run.recording[name]
-        noise = noise_of_sensor(run, name) * generator.standard_normal(channel.size)
+        noise = spectra[name].drawn(run, name, generator)
         noisy[name] = channel.copy(data=np.asarray(channel.values, np.float64) + noise)
     return replace(run, recording=run.recording.assign(noisy))

@@ -6,15 +6,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recorded_oscillators import effect, motion, rig, run_of, surroundings
+from recorded_oscillators import RATE_HZ, effect, motion, rig, run_of, surroundings
+from scipy.signal import lfilter, welch
 from test_remainder import run
 
 from sloshlab.diagnosis.inference.diverging_motions import DivergingMotions
 from sloshlab.diagnosis.inference.remainder import remainder
 from sloshlab.identification.observations import observations
 from sloshlab.identification.rig_model import RigModel
+from sloshlab.missing_physics import effects
 from sloshlab.missing_physics.candidate import Candidate
 from sloshlab.rig import Rig
+
+assert effects.__all__
 
 FRICTION_N, START_M, DURATION_S = 0.4, 0.02, 6.0
 TIP = "acceleration_tip"
@@ -70,3 +74,35 @@ def test_what_two_likely_motions_differ_by_is_not_missing() -> None:
     assert remainder([as_likely]).gain("structure") < 3.0
     as_likely.diverging[:] = [0.1 * drawn]
     assert remainder([as_likely]).gain("structure") > 30.0
+
+
+def test_drives_are_drawn_with_the_colour_that_repeats_show(tmp_path: Path) -> None:
+    """Slow noise of an accelerometer moves a velocity, and every reversal of a friction with it."""
+    generator, motion_of_base = np.random.default_rng(3), 20.0 * np.sin(np.arange(round(40 * RATE_HZ)) / 8.0)
+    kept, slow, fast = 0.97, 0.6, 0.8
+    runs = []
+    for repeat in (1, 2):
+        steps = np.sqrt(1 - kept**2) * slow * generator.standard_normal(motion_of_base.size)
+        noise = lfilter([1.0], [1.0, -kept], steps) + fast * generator.standard_normal(motion_of_base.size)
+        read = {"acceleration_root": motion_of_base + noise, TIP: motion_of_base}
+        recorded = run_of(f"run_{repeat}", read, {}, repeat, experiment="other", repeat=repeat)
+        recorded.recording["acceleration_root"].attrs["noise_std"] = 1.0
+        runs.append(recorded)
+    rig(tmp_path)
+    model = RigModel(Rig.from_toml(tmp_path / "rig.toml"), tmp_path, runs)
+
+    def slow_power(motions: DivergingMotions) -> float:
+        """Below two hertz, of what is added to the drive."""
+        densities = []
+        for _, drawn in motions._noisy:
+            for each in runs:
+                added = (drawn[each.name].recording - each.recording)["acceleration_root"].values
+                frequencies, density = welch(added, RATE_HZ, nperseg=1000)
+                densities.append(density[(frequencies > 0.2) & (frequencies < 2.0)].mean())
+        return float(np.mean(densities))
+
+    frequencies = np.linspace(0.2, 2.0, 50)
+    turned = 1 + kept**2 - 2 * kept * np.cos(2 * np.pi * frequencies / RATE_HZ)
+    expected = float(np.mean(fast**2 + slow**2 * (1 - kept**2) / turned)) * 2 / RATE_HZ
+    assert slow_power(DivergingMotions(model, [["run_1", "run_2"]])) == pytest.approx(expected, rel=0.3)
+    assert slow_power(DivergingMotions(model)) == pytest.approx(2 / RATE_HZ, rel=0.15)

@@ -8,17 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from recorded_oscillators import DAMPING, MASS_KG, OMEGA, RATE_HZ, rig, run_of
-from scipy.signal import lfilter, welch
 
 from sloshlab.identification.case import Case, CaseRun
+from sloshlab.identification.drive_noise import WHITE, NoiseSpectrum
 from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.identification.noise_floor import (
-    _WHITE,
     _ignored_where_drive_noise_dominates,
-    _NoiseSpectrum,
     _over_bands_of_a_resonance,
     _propagated_noise,
-    _spectrum_of_drive_noise,
     _with_noise_of_drive,
     weighted_observations,
 )
@@ -48,14 +45,14 @@ def test_noise_of_the_base_comes_through_the_resonance_as_its_closed_form_says(t
     plain = {"quiet": observations(run, ["acceleration_tip"])}
     fit = FreeRunFit((), {"damping of mode 1": MORE_DAMPING}, 0.0, 0.0)
     [(place, draws)] = _propagated_noise(
-        case_of(tmp_path, run), run, {"acceleration_root": _WHITE}, plain=plain, fit=fit
+        case_of(tmp_path, run), run, {"acceleration_root": WHITE}, plain=plain, fit=fit
     ).items()
     found = np.mean(draws**2, axis=0)
     ratio = MORE_DAMPING * DAMPING / (2 * MASS_KG * OMEGA)
     density = 2 * NOISE_M_PER_S2**2 / RATE_HZ
     expected = density * np.pi * OMEGA / (2 * np.pi) * (1 + 4 * ratio**2) / (4 * ratio)
     assert place == ("quiet", "acceleration_tip")
-    noisier = _NoiseSpectrum(np.zeros(1), np.array([4.0]))
+    noisier = NoiseSpectrum(np.zeros(1), np.array([4.0]))
     [of_louder] = _propagated_noise(
         case_of(tmp_path, run), run, {"acceleration_root": noisier}, plain=plain, fit=fit
     ).values()
@@ -72,59 +69,10 @@ def test_a_channel_that_is_left_out_of_the_drive_is_compared_with_another_sensor
     without = CaseRun(run.name, run.recording.drop_vars("acceleration_tip"), run.attributes)
     fit = FreeRunFit((), {}, 0.0, 0.0)
     [found] = _propagated_noise(
-        case_of(tmp_path, run), without, {"acceleration_root": _WHITE}, plain=plain, fit=fit
+        case_of(tmp_path, run), without, {"acceleration_root": WHITE}, plain=plain, fit=fit
     ).values()
     # Away from the tapered ends, draws of white noise as loud as the sensor: 4 × 5 × 124 of them tell 3 %.
     assert float(np.mean(found[:, 2:-2] ** 2)) == pytest.approx(NOISE_M_PER_S2**2, rel=0.08)
-
-
-SLOW, WHITE = 0.6, 0.8
-"""Standard deviations of two parts of a sensor's noise; they are stated as one, of size 1."""
-KEPT = 0.97
-"""Of the slow part from one sample to the next."""
-
-
-def coloured_run(seed: int, motion: np.ndarray) -> CaseRun:
-    """A base whose accelerometer adds white noise and a first-order process to its motion."""
-    generator = np.random.default_rng(seed)
-    steps = np.sqrt(1 - KEPT**2) * SLOW * generator.standard_normal(motion.size)
-    noise = lfilter([1.0], [1.0, -KEPT], steps) + WHITE * generator.standard_normal(motion.size)
-    run = run_of(f"run_{seed}", {"acceleration_root": motion + noise}, {}, seed, experiment="other", repeat=seed)
-    run.recording["acceleration_root"].attrs["noise_std"] = 1.0
-    return run
-
-
-def test_the_colour_of_a_drives_noise_is_that_of_its_closed_form(tmp_path: Path) -> None:
-    """White noise beside a first-order process: density over that of all of it as white noise, at least one."""
-    motion = 30.0 * np.sin(np.arange(50 * 250) / 9.0)
-    runs = [coloured_run(seed, motion) for seed in (1, 2, 3)]
-    found = _spectrum_of_drive_noise(case_of(tmp_path, *runs), "acceleration_root")
-    for frequency in (1.0, 2.0, 4.0, 8.0, 100.0):
-        turned = 1 + KEPT**2 - 2 * KEPT * np.cos(2 * np.pi * frequency / RATE_HZ)
-        expected = max(WHITE**2 + SLOW**2 * (1 - KEPT**2) / turned, 1.0)
-        assert np.interp(frequency, found.frequencies_hz, found.ratios) == pytest.approx(expected, rel=0.25)
-
-
-def test_noise_of_a_colour_has_its_spectrum_and_no_other(tmp_path: Path) -> None:
-    motion = np.zeros(50 * 250)
-    found = _spectrum_of_drive_noise(
-        case_of(tmp_path, *(coloured_run(seed, motion) for seed in (1, 2, 3))), "acceleration_root"
-    )
-    noise = found.coloured(np.random.default_rng(9).standard_normal(200 * 250), RATE_HZ)
-    frequencies, density = welch(noise, RATE_HZ, nperseg=1000)
-    chosen = (frequencies > 0.5) & (frequencies < 20)
-    expected = np.interp(frequencies, found.frequencies_hz, found.ratios) * 2 / RATE_HZ
-    assert density[chosen] == pytest.approx(expected[chosen], rel=0.5)
-    assert density[chosen].mean() == pytest.approx(expected[chosen].mean(), rel=0.1)
-
-
-def test_drives_that_differ_by_more_than_noise_tell_no_colour(tmp_path: Path) -> None:
-    motion = 30.0 * np.sin(np.arange(50 * 250) / 9.0)
-    runs = [coloured_run(1, motion), coloured_run(2, motion + 5.0 * np.sin(np.arange(motion.size) / 40.0))]
-    case = case_of(tmp_path, *runs)
-    assert len(case.tests()) == 1
-    assert _spectrum_of_drive_noise(case, "acceleration_root") is _WHITE
-    assert _spectrum_of_drive_noise(case_of(tmp_path, runs[0]), "acceleration_root") is _WHITE
 
 
 def test_the_floor_of_two_repeats_knows_the_noise_of_the_base(tmp_path: Path) -> None:
