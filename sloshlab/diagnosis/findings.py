@@ -16,6 +16,7 @@ from sloshlab.diagnosis.inference.run_noise import run_noise
 from sloshlab.diagnosis.inference.sampled_jumps import with_sampled_jumps
 from sloshlab.diagnosis.inference.scored_model import ScoredModel, scored
 from sloshlab.diagnosis.inference.whitened import whitened
+from sloshlab.diagnosis.selection.explained_scatter import ExplainedScatter
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
 from sloshlab.diagnosis.selection.model_selection import ModelSelection
 from sloshlab.diagnosis.surroundings import surroundings_of
@@ -138,12 +139,15 @@ def findings_of(
     every = with_fluctuation(model, quiet, case.repeated, retuned_fit)
     if every != quiet:
         fitting, held_out = every[: len(fitting)], every[len(fitting) :]
-        runs = FittedRuns(model, fitting, case.names_by_test())
+        runs = FittedRuns(model, fitting, case.names_by_test(), runs.effort)
         retuned_fit, _ = fitted(runs.problem(), retuned_fit.values, stages=INFLATION_STAGES[-1:])
     problem = runs.problem()
-    selection = ModelSelection(runs, surroundings_of(problem, retuned_fit, case.rig), progress)
+    scatter = ExplainedScatter(model, fitting, held_out, case.names_by_test())
+    selection = ModelSelection(runs, surroundings_of(problem, retuned_fit, case.rig), progress, scatter)
     fits = selection.selected(retuned_fit)
-    fitting, held_out = (with_sampled_jumps(model, some, selection.jumping) for some in (fitting, held_out))
+    fitting, held_out = (
+        with_sampled_jumps(model, some, selection.jumping) for some in (scatter.fitting, scatter.held_out)
+    )
     nothing = next(fit for fit in fits if not fit.candidates)
     with_effects = sorted((fit for fit in fits if fit.candidates), key=lambda fit: fit.cost)
     believed_fit = FreeRunFit((), problem.values(problem.theta_of(model.believed)), 0.0, 0.0)
@@ -198,7 +202,7 @@ class Scoring:
         tests: Sequence[Sequence[str]],
     ) -> None:
         self.model, self.held_out, self.everything = model, held_out, [*fitting, *held_out]
-        self.tests, self._motions = tests, DivergingMotions(model)
+        self.tests, self._motions = tests, DivergingMotions(model, tests)
         self.noise = [run_noise(model, run, nothing.values) for run in self.everything]
 
     def of(self, fit: FreeRunFit, nothing: ScoredModel | None = None) -> ScoredModel | None:

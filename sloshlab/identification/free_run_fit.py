@@ -236,7 +236,6 @@ class _LevenbergMarquardt:
             self.problem.names,
             self.problem.scales,
             self.problem.prior_weights(self.theta),
-            self.problem.n_simulations,
         )
 
 

@@ -14,6 +14,7 @@ from sloshlab.errors import SloshlabError
 from sloshlab.identification.baseline_parameter import BaselineParameter, prior_cost, prior_weights
 from sloshlab.identification.block_jacobian import BlockJacobian
 from sloshlab.identification.diagnosed_model import DiagnosedModel, Request
+from sloshlab.identification.effort import Effort
 from sloshlab.identification.observations import Observation
 from sloshlab.missing_physics.candidate import Candidate, channels_of, extension_of
 
@@ -61,7 +62,6 @@ class FreeRunFit:
     scales : ndarray, shape (n,)
     prior_weights : ndarray, shape (n,)
         Weights of the squares of scaled values in the Hessian, by the prior of the baseline.
-    n_simulations : int
     trouble : str
         Why there is no result; empty where there is one.
     """
@@ -74,7 +74,6 @@ class FreeRunFit:
     names: tuple[str, ...] = ()
     scales: FloatArray = field(default_factory=lambda: np.zeros(0))
     prior_weights: FloatArray = field(default_factory=lambda: np.zeros(0))
-    n_simulations: int = 0
     trouble: str = ""
 
     def standard_error(self, name: str) -> float:
@@ -124,6 +123,8 @@ class FreeRunProblem:
     candidates : sequence of Candidate
     fixed : mapping, optional
         Parameters that are not free.
+    effort : Effort, optional
+        That of a search, to which its simulations are added.
     """
 
     def __init__(
@@ -132,7 +133,9 @@ class FreeRunProblem:
         runs: Sequence[Sequence[Observation]],
         candidates: Sequence[Candidate] = (),
         fixed: Mapping[str, float] | None = None,
+        effort: Effort | None = None,
     ) -> None:
+        self.effort = effort or Effort()
         self.model, self.runs, self.candidates = model, [run for run in runs if run], tuple(candidates)
         self.fixed = dict(fixed or {})
         present = {observation.run.name for run in self.runs for observation in run}
@@ -158,7 +161,6 @@ class FreeRunProblem:
         self._is_reading = np.array([number.is_reading for number in baseline], bool)
         ends = np.cumsum([0] + [observation.spectra.size for run in self.runs for observation in run])
         self._rows = [slice(int(first), int(end)) for first, end in pairwise(ends)]
-        self.n_simulations = 0
 
     def prior_cost(self, theta: FloatArray, inflation: float = 0.0) -> float:
         """What scaled parameters cost by their prior, zero where all are as believed.
@@ -224,7 +226,7 @@ class FreeRunProblem:
 
     def _weighted(self, parts: Sequence[_Part]) -> Iterator[FloatArray]:
         """Weighted residuals of every observation of every part, one after the other."""
-        self.n_simulations += len(parts)
+        self.effort.add(sum(observation.spectra.size for run, _ in parts for observation in run))
         for some in _at_once(parts):
             yield from weighted_residuals(self.model, some, self.candidates)
 

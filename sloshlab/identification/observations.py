@@ -385,6 +385,17 @@ def with_typical_scatter(target: Sequence[Observation], sources: Sequence[Observ
     return weighted
 
 
+def without_scatter(run: Sequence[Observation]) -> list[Observation]:
+    """Observations of a run known to the noise of their sensors and drives: what differs from repeat to repeat may
+    be physics.
+
+    Parameters
+    ----------
+    run : sequence of Observation
+    """
+    return [each if each.without_scatter is None else replace(each, variance=each.without_scatter) for each in run]
+
+
 def _weighted(observation: Observation, variance: FloatArray) -> Observation:
     # Repeats that agree by chance must not make a coefficient better known than its sensor.
     least = observation.variance

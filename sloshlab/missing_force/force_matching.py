@@ -21,6 +21,7 @@ from scipy.optimize import differential_evolution, least_squares
 
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.diagnosed_model import EXACT
+from sloshlab.identification.effort import Effort
 from sloshlab.identification.rig_model import steps_per_sample
 from sloshlab.missing_force.latent_force import EITHER, STRUCTURE, TANK, LatentForce, along, forces_alone
 from sloshlab.missing_physics.candidate import Candidate, Numbers
@@ -81,6 +82,8 @@ class ForceMatching:
     ----------
     forces : sequence of LatentForce
         Of one place, one per run.
+    effort : Effort, optional
+        That of a search, to which samples of forces are added.
 
     Attributes
     ----------
@@ -90,7 +93,8 @@ class ForceMatching:
         Whether they are more than those of noise besides those of noise.
     """
 
-    def __init__(self, forces: Sequence[LatentForce]) -> None:
+    def __init__(self, forces: Sequence[LatentForce], effort: Effort | None = None) -> None:
+        self._effort, self._n_samples = effort or Effort(), sum(force.force_n.size for force in forces)
         self._drives = [_drive(force) for force in forces]
         self._doubled = [_drive(force, 2.0) for force in forces]
         self._whiteners = [_Whitener(force) for force in forces]
@@ -293,6 +297,7 @@ class ForceMatching:
                 if twin is not None
                 for drive in self._drives
             ]
+            self._effort.add(self._n_samples * len(lanes) // n)
             found = iter(motions(lanes))
             for twin in twins:
                 yield None if twin is None else self._joined(list(islice(found, n)))
@@ -314,13 +319,15 @@ class ForceMatching:
         return np.asarray(series - self._linear @ (self._linear.T @ series))
 
 
-def matchings(forces: Sequence[Sequence[LatentForce]]) -> dict[str, ForceMatching]:
+def matchings(forces: Sequence[Sequence[LatentForce]], effort: Effort | None = None) -> dict[str, ForceMatching]:
     """Per block, where its missing forces are told apart.
 
     Parameters
     ----------
     forces : sequence of sequences of LatentForce
         Per run.
+    effort : Effort, optional
+        That of a search.
     """
     found = {}
     for place in (STRUCTURE, TANK):
@@ -328,7 +335,7 @@ def matchings(forces: Sequence[Sequence[LatentForce]]) -> dict[str, ForceMatchin
         places = (place, EITHER) if place == STRUCTURE else (place,)
         own = [force for of_run in forces for force in of_run if force.place in places]
         if own:
-            found[place] = ForceMatching(own)
+            found[place] = ForceMatching(own, effort)
     return found
 
 

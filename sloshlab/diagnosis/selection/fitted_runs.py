@@ -12,9 +12,10 @@ import numpy as np
 
 from sloshlab.diagnosis.selection.missing_forces import latent_forces, missing_forces
 from sloshlab.identification.diagnosed_model import DiagnosedModel
+from sloshlab.identification.effort import Effort
 from sloshlab.identification.free_run_fit import fitted, fitted_baseline
 from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, run_of
-from sloshlab.identification.observations import Observation
+from sloshlab.identification.observations import Observation, without_scatter
 from sloshlab.missing_physics.candidate import Candidate
 from sloshlab.missing_physics.prior import drawn
 
@@ -37,10 +38,15 @@ class FittedRuns:
         Per run.
     tests : sequence of sequences of str
         Names of the runs of every test.
+    effort : Effort, optional
+        That of a search, to which all simulations of these runs are added.
     """
 
-    def __init__(self, model: DiagnosedModel, runs: Runs, tests: Sequence[Sequence[str]]) -> None:
+    def __init__(
+        self, model: DiagnosedModel, runs: Runs, tests: Sequence[Sequence[str]], effort: Effort | None = None
+    ) -> None:
         self.model, self.runs, self.tests = model, list(runs), tests
+        self.effort = effort or Effort()
 
     @cached_property
     def one_repeat_per_test(self) -> FittedRuns:
@@ -55,19 +61,13 @@ class FittedRuns:
             first.setdefault(test_of.get(run[0].run.name, run[0].run.name), run)
         if len(first) == len(self.runs):
             return self
-        return FittedRuns(self.model, list(first.values()), self.tests)
+        return FittedRuns(self.model, list(first.values()), self.tests, self.effort)
 
     @cached_property
     def without_scatter(self) -> FittedRuns:
         """The same runs known to the noise of their sensors: what differs from repeat to repeat may be physics."""
-        quiet = [
-            [
-                each if each.without_scatter is None else replace(each, variance=each.without_scatter)
-                for each in run
-            ]
-            for run in self.runs
-        ]
-        return FittedRuns(self.model, quiet, self.tests)
+        quiet = [without_scatter(run) for run in self.runs]
+        return FittedRuns(self.model, quiet, self.tests, self.effort)
 
     @property
     def n_coefficients(self) -> int:
@@ -76,14 +76,16 @@ class FittedRuns:
 
     def problem(self, candidates: Sequence[Candidate] = ()) -> FreeRunProblem:
         """These runs with some effects."""
-        return FreeRunProblem(self.model, self.runs, candidates)
+        return FreeRunProblem(self.model, self.runs, candidates, effort=self.effort)
 
     def problem_of(self, fit: FreeRunFit) -> FreeRunProblem:
         """These runs with the effects of a fit."""
         return self.problem(fit.candidates)
 
 
-def values_of_runs(model: DiagnosedModel, runs: Runs, fit: FreeRunFit) -> dict[str, float]:
+def values_of_runs(
+    model: DiagnosedModel, runs: Runs, fit: FreeRunFit, effort: Effort | None = None
+) -> dict[str, float]:
     """Values of a fit with the numbers that belong to single runs fitted to these runs, one by one.
 
     Releases, offsets and the fluctuation of a liquid are unknown in a run that was not fitted and are no part of
@@ -96,11 +98,13 @@ def values_of_runs(model: DiagnosedModel, runs: Runs, fit: FreeRunFit) -> dict[s
     model : DiagnosedModel
     runs : sequence of sequences of Observation
     fit : FreeRunFit
+    effort : Effort, optional
+        To which the simulations are added.
     """
     shared = {name: value for name, value in fit.values.items() if not run_of(name, model)}
     values = dict(fit.values)
     for run in runs:
-        problem = FreeRunProblem(model, [run], fit.candidates, shared)
+        problem = FreeRunProblem(model, [run], fit.candidates, shared, effort)
         if problem.names:
             fits = fitted_baseline if run[0].run.is_free else fitted
             start = _best_started(problem, problem.values(problem.theta_of(fit.values)), fit)

@@ -14,7 +14,6 @@ from sloshlab.diagnosis.selection.successive_halving import HOPELESS_COST_RATIO
 from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.missing_force.force_matching import ForceMatching, Match, force_alone, matchings
 from sloshlab.missing_physics.candidate import Candidate, Numbers
-from sloshlab.twin.lane_preparation import Executor
 
 _N_STARTS: Final = 2
 """Of a match, from which a fit may be begun."""
@@ -73,7 +72,7 @@ def matched_forces(runs: FittedRuns, fit: FreeRunFit, pool: Sequence[Candidate],
     residual = problem.residual(problem.theta_of(fit.values))
     if not np.isfinite(residual).all():
         return MatchedForces()
-    matches = _Matches(Places.beside(runs, fit, residual), missing_from(fit, pool), runs.model.executor)
+    matches = _Matches(runs, Places.beside(runs, fit, residual), missing_from(fit, pool))
     matches.improve(matches.candidates, matches.ranked)
     matches.improve(matches.hopeful(), matches.refined)
     return matches.found([candidate for candidate in matches.hopeful() if matches.explains(candidate)][:n_leading])
@@ -84,10 +83,9 @@ class _Matches:
 
     Parameters
     ----------
+    runs : FittedRuns
     places : Places
     pool : sequence of Candidate
-    executor : Executor
-        Of the matches of several candidates.
 
     Attributes
     ----------
@@ -97,9 +95,9 @@ class _Matches:
         The best first; none of what is no force, or at a place at which nothing is missing.
     """
 
-    def __init__(self, places: Places, pool: Sequence[Candidate], executor: Executor) -> None:
-        self._places, self._executor = places, executor
-        self._matching = matchings(list(places.forces.values()))
+    def __init__(self, runs: FittedRuns, places: Places, pool: Sequence[Candidate]) -> None:
+        self._places, self._executor = places, runs.model.executor
+        self._matching = matchings(list(places.forces.values()), runs.effort)
         self.candidates = [candidate for candidate in pool if candidate.effect.block in self._matching]
         self.of: dict[str, list[Match]] = {}
         self._population: dict[str, list[Match]] = {}

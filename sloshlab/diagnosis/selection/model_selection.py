@@ -21,12 +21,13 @@ from sloshlab.diagnosis.inference.sampled_jumps import with_sampled_jumps
 from sloshlab.diagnosis.inference.scored_model import complexity, is_worth_a_word
 from sloshlab.diagnosis.inference.thresholds import LAW
 from sloshlab.diagnosis.inference.whitened import whitened
+from sloshlab.diagnosis.selection.explained_scatter import ExplainedScatter
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
 from sloshlab.diagnosis.selection.hidden_effects import hidden_effects
 from sloshlab.diagnosis.selection.matched_forces import MatchedForces, matched_forces
 from sloshlab.diagnosis.selection.proposals import NO_STARTS, Base, most_promising, proposals
 from sloshlab.diagnosis.selection.successive_halving import HOPELESS_COST_RATIO, NO_CHANCE, halved
-from sloshlab.identification.free_run_fit import fitted, stages_for
+from sloshlab.identification.free_run_fit import fitted, inflated_cost, stages_for
 from sloshlab.identification.free_run_problem import TEMPERING, FreeRunFit, FreeRunProblem, huber_cost, run_of
 from sloshlab.missing_force.latent_force import STRUCTURE, TANK
 from sloshlab.missing_physics.candidate import Candidate, Surroundings, candidates, extension_of
@@ -37,10 +38,8 @@ N_KEPT: Final = 4
 """Models that are fitted to the end at every step of the search; eight times as many are begun, half of them where
 one is known that explains as much, so that the others are only compared with it."""
 _MOST_EFFECTS: Final = 2
-_BUDGET: Final = 1.2e9
-"""Coefficients that may be simulated, two minutes on two cores; what is begun is finished, no more is begun."""
-_EVALUATIONS_OF_FITS: Final = 800
-"""Simulations that the fits of one growth take, about: 56 of three steps and four to the end."""
+_BUDGET: Final = 6e8
+"""Readings that may be simulated, two minutes on two cores; what is begun is finished, no more is begun."""
 _LEAST_EXPLAINED: Final = 0.1
 """Of what is left beyond noise, that the last effect of the best model explains if the search is to add others.
 
@@ -59,18 +58,23 @@ class ModelSelection:
     at : Surroundings
     said : callable
         Told what is being done, how much of it is done, and how much there is.
+    scatter : ExplainedScatter, optional
+        Of these runs; without it their noise is what it is.
     """
 
-    def __init__(self, runs: FittedRuns, at: Surroundings, said: Said) -> None:
+    def __init__(
+        self, runs: FittedRuns, at: Surroundings, said: Said, scatter: ExplainedScatter | None = None
+    ) -> None:
+        self._scatter = scatter
         self._quiet, self.runs, self.at, self.said = runs, runs, at, said
-        self._motions, self.pool = DivergingMotions(runs.model), candidates(at)
+        self._motions, self.pool = DivergingMotions(runs.model, runs.tests), candidates(at)
         self.fits: dict[frozenset[str], FreeRunFit] = {}
         self.failed: dict[str, str] = {}
         self._matched: dict[frozenset[str], MatchedForces] = {}
         self._swapped_beside: dict[frozenset[str], set[frozenset[str]]] = {}
         self._simplified_at: dict[tuple[frozenset[str], str], Mapping[str, float]] = {}
         self._promising: dict[str, list[dict[str, float]]] = {}
-        self._left = _BUDGET
+        self._reached = {1}
 
     def selected(self, retuned: FreeRunFit) -> list[FreeRunFit]:
         """Fits of all models that were worth one, each at its best optimum; nothing first.
@@ -85,26 +89,14 @@ class ModelSelection:
         if self._remains(retuned):
             self._added([self._as_believed(), retuned], "one effect", retuned)
             self._renew_sampling()
-            self._swapped(1)
         elif not self._uncovered(retuned):
             return self._sorted()
-        self._simplified(1)
-        for n in range(1, _MOST_EFFECTS + 1):
-            best = self._best_of(n)
-            if best is None:
-                break
-            if not self._remains(best):
-                if n < _MOST_EFFECTS and self._uncovered(best):
-                    self._simplified(n + 1)
-                break
-            self._refined(best)
-            best = self._best_of(n)
-            if best is None or n == _MOST_EFFECTS or not self._remains(best) or self._explains_little(n):
-                break
-            self._extended(n)
-            self._renew_sampling()
-            self._swapped(n + 1)
-            self._simplified(n + 1)
+        # Forward as far as something is left, before effort goes into models that leave it; then each length.
+        reached = 0
+        while (n := self._extended_to()) > reached:
+            reached = n
+            for length in range(n, 0, -1):
+                self._settled(length)
         # What was found beside other effects may be the best alone, and has look-alikes of its own.
         for n in range(1, _MOST_EFFECTS + 1):
             if any(self._may_win(fit) for fit in self._of(n)[:1]):
@@ -113,6 +105,37 @@ class ModelSelection:
         for n in range(_MOST_EFFECTS, 0, -1):
             self._simplified(n)
         return self._sorted()
+
+    def _extended_to(self) -> int:
+        """Number of effects up to which models are sought: one more where the best one leaves something."""
+        n = 1
+        while n < _MOST_EFFECTS:
+            best = self._best_of(n)
+            if best is None or self._explains_little(n):
+                break
+            if not self._remains(best) and not (self._renew_scatter(best) and self._remains(best)):
+                break
+            if n + 1 not in self._reached:
+                self._reached.add(n + 1)
+                self._extended(n)
+                self._renew_sampling()
+            n += 1
+        return n
+
+    def _settled(self, n: int) -> None:
+        """The best model of so many effects against others in their places, other numbers, and simpler ones."""
+        best = self._best_of(n)
+        if best is None or not self._may_win(best):
+            return
+        self._swapped(n)
+        self._simplified(n)
+        best = self._best_of(n)
+        if best is None:
+            return
+        if self._remains(best):
+            self._refined(best)
+        elif n < _MOST_EFFECTS and self._uncovered(best):
+            self._simplified(n + 1)
 
     def _sorted(self) -> list[FreeRunFit]:
         return sorted(self.fits.values(), key=lambda fit: (len(fit.candidates), fit.cost))
@@ -123,6 +146,17 @@ class ModelSelection:
         nothing = self.fits[frozenset()]
         better = sorted((fit for fit in self.fits.values() if fit.cost < nothing.cost), key=lambda fit: fit.cost)
         return [nothing, *better[:N_KEPT]]
+
+    def _renew_scatter(self, best: FreeRunFit) -> bool:
+        """Noise by the scatter of repeats about a fit that explains some of it; whether it does."""
+        scatter, quiet = self._scatter, self._quiet
+        if scatter is None or not scatter.is_explained(best):
+            return False
+        self._quiet = FittedRuns(quiet.model, scatter.fitting, quiet.tests, quiet.effort)
+        self._renew_sampling()
+        # What looked alike in the noise of before may not do so now.
+        self._swapped_beside.clear()
+        return True
 
     def _renew_sampling(self) -> None:
         """Noise by jumps of what has been found, and the costs of all fits with it."""
@@ -135,7 +169,7 @@ class ModelSelection:
             for new, old in zip(run, known, strict=True)
         ):
             return
-        self.runs = FittedRuns(quiet.model, renewed, quiet.tests)
+        self.runs = FittedRuns(quiet.model, renewed, quiet.tests, quiet.effort)
         for keys, fit in self.fits.items():
             problem = self.runs.problem_of(fit)
             misfit = huber_cost(problem.residual(problem.theta_of(fit.values)))
@@ -145,7 +179,7 @@ class ModelSelection:
         """The baseline as believed, with numbers of single runs fitted: retuning may have hidden an effect."""
         model = self.runs.model
         plain = FreeRunFit((), dict(model.believed), 0.0, 0.0)
-        return FreeRunFit((), values_of_runs(model, self.runs.runs, plain), 0.0, 0.0)
+        return FreeRunFit((), values_of_runs(model, self.runs.runs, plain, self.runs.effort), 0.0, 0.0)
 
     def _remains(self, fit: FreeRunFit) -> bool:
         """Whether something is left in the fitted runs that noise and bursts do not explain."""
@@ -210,7 +244,6 @@ class ModelSelection:
         inflations = sorted({stages[0], stages[-1]}, reverse=True)
         promising = promising or self._promising
         proposed = proposals(few, kept, pool, inflations, promising, matched.starts, matched.left)
-        self._left -= (len(proposed) + _EVALUATIONS_OF_FITS) * few.n_coefficients
         ran = {proposal.candidates[-1].key for proposal in proposed}
         tried = {candidate.key for candidate in pool} - {c.key for base in bases for c in base.candidates}
         self.failed |= dict.fromkeys(tried - ran, "does not run from any start")
@@ -224,17 +257,27 @@ class ModelSelection:
             (N_KEPT * 2 ** len(stages) // (1 if against is None else 2), N_KEPT),
             lambda name, i, n: self.said(f"{what}: {name}", i, n),
         )
+        news = [fit for fit in coarse if not self._is_known(few, fit, stages[-1])]
         # The best one first: what is far behind it is not fitted to the end.
-        for some in (coarse[:1], coarse[1:]):
+        for some in (news[:1], news[1:]):
             hopeless = self._hopeless_cost()
             self._keep(
                 self.runs.model.executor.map(lambda fit: self._to_the_end(fit, bases[0], hopeless), some)  # noqa: B023
             )
 
+    def _is_known(self, runs: FittedRuns, coarse: FreeRunFit, inflation: float) -> bool:
+        """Whether a fit of the same model is known that leaves less in the same noise than a coarse one."""
+        known = self.fits.get(_keys_of(coarse.candidates))
+        if known is None:
+            return False
+        problem = runs.problem_of(coarse)
+        return inflated_cost(problem, known, inflation) <= inflated_cost(problem, coarse, inflation)
+
     def _has_budget(self) -> bool:
-        if self._left <= 0:
+        is_left = self.runs.effort.n_readings < _BUDGET
+        if not is_left:
             self.failed["search"] = "ended at its budget, with more effects to try"
-        return self._left > 0
+        return is_left
 
     def _uncovered(self, fit: FreeRunFit) -> bool:
         """Effects that baseline or noise hide beside a fit which leaves nothing; whether one is more probable."""
@@ -269,7 +312,7 @@ class ModelSelection:
         """
         matched = self._matched_beside(best, what)
         enough = self._leaving_nothing(best, matched)
-        if enough is None and matched.leading:
+        if enough is None and matched.leading and self._has_budget():
             self.said(f"{what}: matching forces", 0, 1)
             matched = matched.evolved()
             enough = self._leaving_nothing(best, matched)
@@ -287,11 +330,10 @@ class ModelSelection:
     def _matched_beside(self, fit: FreeRunFit, what: str) -> MatchedForces:
         """Forces matched to what is missing beside a fit."""
         keys = _keys_of(fit.candidates)
-        if keys not in self._matched and self._left > 0:
+        if keys not in self._matched and self._has_budget():
             self.said(f"{what}: matching forces", 0, 1)
             few = self.runs.one_repeat_per_test
             self._matched[keys] = matched_forces(few, fit, self._pool_beside([fit]), N_KEPT)
-            self._left -= _EVALUATIONS_OF_FITS * few.n_coefficients
         return self._matched.get(keys, MatchedForces())
 
     def _pool_beside(self, bases: Sequence[FreeRunFit]) -> list[Candidate]:
@@ -364,7 +406,7 @@ class ModelSelection:
             return fit
         # Each of these by itself, from many starts: one that comes to rest elsewhere, or has its pulses at other
         # instants, holds all other numbers back.
-        values = values_of_runs(self.runs.model, alone, fit)
+        values = values_of_runs(self.runs.model, alone, fit, self.runs.effort)
         if not problem.costs([values])[0] < fit.cost:
             return fit
         other = _at_its_optimum(problem, values, hopeless_cost)
@@ -374,7 +416,7 @@ class ModelSelection:
         """A fit from matched numbers, first of all others beside them, which had taken the place of the effect."""
         candidate, numbers = matched
         candidates = (*base.candidates, candidate)
-        beside = FreeRunProblem(self.runs.model, self.runs.runs, candidates, numbers)
+        beside = FreeRunProblem(self.runs.model, self.runs.runs, candidates, numbers, self.runs.effort)
         start = {**base.values, **numbers}
         hopeless = self._hopeless_cost()
         held = _at_its_optimum(beside, beside.values(beside.theta_of(start)), hopeless)
@@ -429,7 +471,7 @@ class ModelSelection:
         Friction and contacts make many local minima, and a baseline that stood in for the effect is at the bounds
         of several numbers, which hold each other there.
         """
-        for effect in best.candidates:
+        for effect in best.candidates if self._has_budget() else ():
             numbers, rest = _own_numbers(best, effect), _without(best, effect)
             believed = FreeRunFit(rest.candidates, {**rest.values, **self.runs.model.believed}, 0.0, 0.0)
             draws = norm.ppf(qmc.Halton(len(numbers), seed=0).random(8 * N_KEPT))

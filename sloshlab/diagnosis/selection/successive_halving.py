@@ -21,8 +21,8 @@ _STEPS_OF_A_RUNG: Final = 3
 """Of a fit before it is compared with the others."""
 _STARTS_OF_A_MODEL: Final = 2
 """That may go on beside each other."""
-_STARTS_OF_A_NAME: Final = 4
-"""That are begun: two of one model and two of another. Forms and places of one effect predict nearly the same."""
+_MODELS_OF_A_NAME: Final = 2
+"""That go on beside each other: forms and places of one effect predict nearly the same; others need the room."""
 HOPELESS_COST_RATIO: Final = 3.0
 """Cost over the lowest one at the same noise: what is its equal is no further behind after three steps."""
 NO_CHANCE: Final = 7.0
@@ -82,7 +82,7 @@ def _best_starts(proposed: Sequence[Proposal], n: int) -> list[Proposal]:
         n_ranked, of_model, of_name = 0, Counter[frozenset[str]](), Counter[str]()
         for i in np.argsort([proposal.predicted[k] for proposal in proposed], kind="stable"):
             keys, name = proposed[i].keys, proposed[i].candidates[-1].effect.known_as
-            if of_model[keys] < _STARTS_OF_A_MODEL and of_name[name] < _STARTS_OF_A_NAME:
+            if of_model[keys] < _STARTS_OF_A_MODEL and of_name[name] < _MODELS_OF_A_NAME * _STARTS_OF_A_MODEL:
                 n_ranked, of_model[keys], of_name[name] = n_ranked + 1, of_model[keys] + 1, of_name[name] + 1
                 rank[i] = min(rank[i], n_ranked)
     return [proposed[i] for i in np.argsort(rank, kind="stable")[:n] if np.isfinite(rank[i])]
@@ -101,14 +101,17 @@ def _continued(runs: FittedRuns, running: _Running, inflation: float) -> _Runnin
 
 
 def _better(running: Sequence[_Running], n: int, of_a_model: int) -> list[_Running]:
-    """The lowest costs, with at most so many starts of one model; none that is hopeless."""
+    """The lowest costs, with at most so many starts of one model and models of one name; none that is hopeless."""
     least = min((each.cost for each in running), default=0.0)
     # Where nearly all noise is inflated a ratio of costs says nothing.
     most = max(HOPELESS_COST_RATIO * least, least + 2 * TEMPERING * NO_CHANCE)
     kept: list[_Running] = []
-    taken: dict[frozenset[str], int] = {}
+    taken, of_name = Counter[frozenset[str]](), Counter[str]()
     for each in sorted(running, key=lambda each: each.cost):
-        taken[each.proposal.keys] = taken.get(each.proposal.keys, 0) + 1
-        if np.isfinite(each.cost) and each.cost <= most and taken[each.proposal.keys] <= of_a_model:
+        keys, name = each.proposal.keys, each.proposal.candidates[-1].effect.known_as
+        if not np.isfinite(each.cost) or each.cost > most:
+            break
+        if taken[keys] < of_a_model and of_name[name] < _MODELS_OF_A_NAME * of_a_model:
+            taken[keys], of_name[name] = taken[keys] + 1, of_name[name] + 1
             kept.append(each)
     return kept[:n]

@@ -11,8 +11,10 @@ from sloshlab.diagnosis.selection import successive_halving
 from sloshlab.diagnosis.selection.successive_halving import _Running
 
 
-def running(name: str, cost: float) -> _Running:
-    return _Running(cast(Any, SimpleNamespace(keys=frozenset([name]))), {}, None, cost)
+def running(key: str, cost: float) -> _Running:
+    effect = SimpleNamespace(known_as=key.rpartition(".")[2])
+    candidates = (SimpleNamespace(effect=effect),)
+    return _Running(cast(Any, SimpleNamespace(keys=frozenset([key]), candidates=candidates)), {}, None, cost)
 
 
 def kept(costs: dict[str, float], n: int = 4) -> set[str]:
@@ -31,3 +33,9 @@ def test_what_inflated_noise_hides_nearly_all_of_is_not() -> None:
 
 def test_the_lowest_costs_go_on() -> None:
     assert kept({"mass": 3.0, "spring": 1.0, "drag": 2.0}, n=2) == {"spring", "drag"}
+
+
+def test_places_of_one_name_leave_room_for_others() -> None:
+    """Of three pulse trains that lead two go on, and so do the two others behind them."""
+    costs = {"structure.pulses": 1.0, "tank.pulses": 1.1, "sensor.pulses": 1.2, "drag": 1.3, "play": 1.4}
+    assert kept(costs) == {"structure.pulses", "tank.pulses", "drag", "play"}

@@ -29,8 +29,15 @@ from scipy.signal import lsim
 from sloshlab.identification import rig_model
 from sloshlab.identification.block_jacobian import BlockJacobian
 from sloshlab.identification.case import CaseRun
+from sloshlab.identification.effort import Effort
 from sloshlab.identification.free_run_fit import INFLATION_STAGES, _step_within_bounds, fitted, inflated_cost
-from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost, robust_weights
+from sloshlab.identification.free_run_problem import (
+    FreeRunFit,
+    FreeRunProblem,
+    huber_cost,
+    robust_weights,
+    run_of,
+)
 from sloshlab.identification.observations import observations
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_physics import effects
@@ -423,8 +430,27 @@ def test_derivatives_that_are_wrong_are_made_anew_in_every_stage(tmp_path: Path)
 def test_a_fit_is_given_up_where_its_steps_cannot_reach_what_is_asked(tmp_path: Path) -> None:
     """One that can reach it goes on to the same optimum by the same simulations."""
     runs, free = decays(duration_s=1.5), [FREQUENCY, LOSS]
-    whole, _ = fitted(problem_of(tmp_path, runs, [], free), {})
-    within, _ = fitted(problem_of(tmp_path, runs, [], free), {}, hopeless_cost=lambda inflation: 2.0 * whole.cost)
-    assert (within.values, within.n_simulations) == (whole.values, whole.n_simulations)
-    beyond, _ = fitted(problem_of(tmp_path, runs, [], free), {}, hopeless_cost=lambda inflation: 0.0)
-    assert beyond.n_simulations < whole.n_simulations
+    problems = [problem_of(tmp_path, runs, [], free) for _ in range(3)]
+    whole, _ = fitted(problems[0], {})
+    within, _ = fitted(problems[1], {}, hopeless_cost=lambda inflation: 2.0 * whole.cost)
+    fitted(problems[2], {}, hopeless_cost=lambda inflation: 0.0)
+    of_whole, of_within, of_beyond = (problem.effort.n_readings for problem in problems)
+    assert (within.values, of_within) == (whole.values, of_whole)
+    assert of_beyond < of_whole
+
+
+def test_every_reading_that_is_simulated_is_counted_once(tmp_path: Path) -> None:
+    """A release is simulated for its run alone, and all problems of a search count together."""
+    runs = decays(duration_s=1.5)
+    effort = Effort()
+    plain = problem_of(tmp_path, runs, [], [FREQUENCY])
+    problem = FreeRunProblem(plain.model, plain.runs, (), plain.fixed, effort)
+    of_a_run = sum(observation.spectra.size for observation in plain.runs[0])
+    theta = problem.theta_of({})
+    at = problem.residual(theta)
+    assert effort.n_readings == of_a_run * len(runs)
+    own = next(i for i, name in enumerate(problem.names) if run_of(name, problem.model) == runs[0].name)
+    problem.jacobian(theta, at, [own])
+    assert effort.n_readings == of_a_run * (len(runs) + 1)
+    FreeRunProblem(plain.model, plain.runs, (), plain.fixed, effort).residual(theta)
+    assert effort.n_readings == of_a_run * (2 * len(runs) + 1)

@@ -1,0 +1,78 @@
+"""Noise of repeats about a model that explains what they differ by: that of their sensors alone is left."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from recorded_oscillators import RATE_HZ, decays, effect, rig, surroundings
+from test_external_force import FORCE_N, PERIOD_S, WIDTH_S, pulses
+
+from sloshlab.diagnosis.selection.explained_scatter import ExplainedScatter
+from sloshlab.identification.free_run_problem import FreeRunFit
+from sloshlab.identification.observations import Observation, observations, with_scatter
+from sloshlab.identification.rig_model import RigModel
+from sloshlab.missing_physics import effects
+from sloshlab.missing_physics.candidate import Candidate
+from sloshlab.missing_physics.extension import NOTHING
+
+assert effects.__all__
+NOISE = {"acceleration_tip": 0.01, "displacement_tank": 1e-5}
+STARTS_S = {"first": 0.37, "second": 0.81}
+
+
+@pytest.fixture(name="model", scope="module")
+def _model(tmp_path_factory: pytest.TempPathFactory) -> RigModel:
+    """Two repeats with the noise of their sensors and a train of pulses that begins at another instant in each."""
+    folder: Path = tmp_path_factory.mktemp("explained")
+    runs = [
+        replace(decays((0.01,), 6.0, noise={}, force=pulses(start))[0], name=name)
+        for name, start in STARTS_S.items()
+    ]
+    generator = np.random.default_rng(2)
+    for run in runs:
+        for name, size in NOISE.items():
+            values = run.recording[name].values
+            run.recording[name].values[:] = values + size * generator.standard_normal(values.size)
+    return RigModel(rig(folder), folder, runs)
+
+
+def fit_of(model: RigModel, *, with_pulses: bool) -> FreeRunFit:
+    if not with_pulses:
+        return FreeRunFit((), dict(model.believed), 0.0, 0.0)
+    at = replace(surroundings(model), runs=tuple(STARTS_S))
+    train = Candidate(effect("structure.external_force").of_runs(tuple(STARTS_S)), at)
+    numbers = {"size_n": FORCE_N, "period_s": PERIOD_S, "width_s": WIDTH_S}
+    numbers |= {f"start_s in {run}": start for run, start in STARTS_S.items()}
+    return FreeRunFit(
+        (train,), {**model.believed, **{f"{train.key}.{n}": v for n, v in numbers.items()}}, 0.0, 0.0
+    )
+
+
+def scattered(model: RigModel) -> list[list[Observation]]:
+    """As they are known about the baseline, which has no pulses."""
+    plain = [observations(run, model.compared(run)) for run in model.runs]
+    left = []
+    for observed in plain:
+        readings = model.simulate(observed[0].run, model.believed, NOTHING)
+        left.append({each.channel: each.spectra - each.of(readings[each.channel]) for each in observed})
+    return with_scatter(plain, left)
+
+
+def test_what_scatters_about_a_model_of_the_pulses_is_the_noise_of_the_sensors(model: RigModel) -> None:
+    runs = scattered(model)
+    scatter = ExplainedScatter(model, runs[:1], runs[1:], [list(STARTS_S)])
+    assert not scatter.is_explained(fit_of(model, with_pulses=False))
+    assert scatter.fitting[0][0] is runs[0][0]
+    assert scatter.is_explained(fit_of(model, with_pulses=True))
+    for after in (*scatter.fitting, *scatter.held_out):
+        for new in after:
+            # white noise has the variance of its samples in every coefficient of an orthonormal transform
+            expected = NOISE[new.channel] ** 2
+            bands = slice(round(10.0 / RATE_HZ * 2 * new.spectra.shape[1]), None)
+            inner = new.variance[2:-2, bands]
+            assert float(np.median(inner)) == pytest.approx(expected, rel=0.3)
+    tip_before, tip_after = (each[0][0].variance[2:-2, :12].mean() for each in (runs, scatter.fitting))
+    assert tip_before > 20.0 * tip_after
