@@ -23,6 +23,7 @@ from acquisition.numerical_tank.tank import STANDARD_GRAVITY_M_PER_S2, Box
 from acquisition.two_phase_tank.setup import Fluids, Walls, filled_two_phase_tank
 from acquisition.two_phase_tank.simulation import TwoPhaseTank
 from sloshlab.atomic_file import write_bytes
+from studies.tank_reference.steady_state import MeanOverCycles, standard_error_of_correlated
 
 TANK: Final = Box(0.1172, 0.0272, 0.078)
 RISE_CYCLES: Final = 3
@@ -86,6 +87,8 @@ class Shaken:
         Work of the tank on the fluids per cycle over m_l u₀² Ω², and −Re(Δf̌/ǔ̈)/m_l.
     w_bar_scatter : float
         Standard deviation of W̄ between cycles.
+    w_bar_error, beta_error : float
+        Standard errors of the means over cycles, which are correlated.
     account_w_bar : float
         The same work by the account of energy, in the frame of the tank.
     shares : dict
@@ -101,6 +104,8 @@ class Shaken:
     w_bar: float
     beta: float
     w_bar_scatter: float
+    w_bar_error: float
+    beta_error: float
     account_w_bar: float
     shares: dict[str, float]
     residual_share: float
@@ -149,6 +154,8 @@ def shaken(case: Shaking) -> Shaken:
         float(np.mean(works)),
         float(np.mean(in_phase)),
         float(np.std(works)),
+        standard_error_of_correlated(works),
+        standard_error_of_correlated(in_phase),
         given * setup.box.depth_m / n_used / unit,
         {name.removesuffix("_j_per_m"): value / given for name, value in asdict(spent).items()},
         spent.residual_j_per_m / given,
@@ -216,7 +223,7 @@ def rows(results: dict[str, dict[str, Any]], cases: Sequence[Shaking]) -> list[s
         given_text = " | ".join("–" if share is None else f"{100 * share:.0f} %" for share in given)
         lines.append(
             f"| {case.acceleration_g:g} g, {case.frequency_hz:g} Hz | {case.cells_per_height} | {case.differs} |"
-            f" {found['w_bar']:.2f} ± {found['w_bar_scatter'] / math.sqrt(case.n_cycles // 2):.2f} |"
+            f" {MeanOverCycles(found['w_bar'], found.get('w_bar_error', math.nan))} |"
             f" {found['beta']:.3f} | {given_text} | {100 * found['residual_share']:.1f} % |"
             f" {found['computing_s_per_s']:.0f} |".replace("-", "−")
         )

@@ -27,7 +27,7 @@ from studies.tank_reference.particle_runs import ParticleCase, read_particles
 from studies.tank_reference.planned_cases import CHANGES, planned_cases
 from studies.tank_reference.points import BEAM_POINT, COMMON_POINTS, DrivenPoint
 from studies.tank_reference.second_liquid import second_liquid
-from studies.tank_reference.steady_state import MeanOverCycles, mean_over_cycles
+from studies.tank_reference.steady_state import MeanOverCycles, mean_over_cycles, standard_error_of_correlated
 
 POINT = DrivenPoint(2.0, 10.0)
 CASE = InterfoamCase(POINT, 12, n_cycles=24)
@@ -150,6 +150,27 @@ def test_error_of_a_mean_is_that_of_blocks() -> None:
     mean = mean_over_cycles([1.0] * 4 + [2.0] * 4 + [3.0] * 4)
     assert (mean.value, mean.standard_error) == (2.0, pytest.approx(1 / math.sqrt(3)))
     assert math.isnan(mean_over_cycles([1.0] * 11).standard_error)
+
+
+@pytest.mark.parametrize("correlation", [-0.5, 0.0, 0.5, 0.8])
+def test_error_of_correlated_cycles_is_that_of_the_process(correlation: float) -> None:
+    """A first-order process has a mean of known variance: σ² (n + 2 Σ (n − k) φᵏ) / n²."""
+    n, n_runs = 50, 400
+    rng = np.random.default_rng(5)
+    cycles = np.empty((n_runs, n))
+    cycles[:, 0] = rng.normal(size=n_runs) / math.sqrt(1 - correlation**2)
+    for k in range(1, n):
+        cycles[:, k] = correlation * cycles[:, k - 1] + rng.normal(size=n_runs)
+    lag = np.arange(1, n)
+    expected = math.sqrt((n + 2 * np.sum((n - lag) * correlation**lag)) / (1 - correlation**2)) / n
+    errors = np.array([standard_error_of_correlated(run) for run in cycles])
+    # single cycles taken as independent give 0.32 at 0.8 and 1.7 at −0.5; fifty cycles do not tell more than this
+    assert 0.85 < math.sqrt(np.mean(errors**2)) / expected < 1.35
+
+
+def test_error_of_few_or_equal_cycles() -> None:
+    assert math.isnan(standard_error_of_correlated([1.0, 2.0] * 5))
+    assert standard_error_of_correlated([1.0, 2.0] * 10) == 0.0
 
 
 def test_results_are_kept_and_belong_to_their_inputs(tmp_path) -> None:
@@ -277,7 +298,7 @@ SECOND = {
 
 def test_second_liquid_is_read_where_it_is(tmp_path) -> None:
     assert second_liquid(tmp_path / "map.json") == {}
-    result = {"w_bar": 0.8, "w_bar_scatter": 0.2, "beta": -0.1}
+    result = {"w_bar": 0.8, "w_bar_error": 0.05, "beta": -0.1}
     cases = {
         "fine": {**result, "case": SECOND},
         "coarse": {**result, "w_bar": 0.7, "case": {**SECOND, "cells_per_height": 16}},
@@ -291,8 +312,18 @@ def test_second_liquid_is_read_where_it_is(tmp_path) -> None:
     found = second_liquid(tmp_path / "map.json")
     assert list(found) == [DrivenPoint(4.0, 11.4)]
     values = found[DrivenPoint(4.0, 11.4)]
-    # the finest between walls that hold; 16 cycles count
-    assert (values.w_bar.value, values.w_bar.standard_error, values.beta.value) == (0.8, pytest.approx(0.05), -0.1)
+    # the finest between walls that hold
+    assert (values.w_bar.value, values.w_bar.standard_error, values.beta.value) == (0.8, 0.05, -0.1)
+    assert math.isnan(values.beta.standard_error)
+    for seed, w_bar in ((1, 0.6), (2, 1.0)):
+        cases[f"seed {seed}"] = {**result, "w_bar": w_bar, "case": {**SECOND, "seed": seed}}
+    (tmp_path / "map.json").write_text(json.dumps(cases))
+    over_starts = second_liquid(tmp_path / "map.json")[DrivenPoint(4.0, 11.4)].w_bar
+    # 0.8, 0.6 and 1.0 have a standard deviation of 0.2
+    assert (over_starts.value, over_starts.standard_error) == (
+        pytest.approx(0.8),
+        pytest.approx(0.2 / math.sqrt(3)),
+    )
     (tmp_path / "map.json").write_text('{"4 g": {}}')
     with pytest.raises(InputError, match="allowed: results of the second liquid's study"):
         second_liquid(tmp_path / "map.json")

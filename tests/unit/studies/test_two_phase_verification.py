@@ -51,7 +51,7 @@ def test_table_names_what_differs() -> None:
     }
     found = {
         "w_bar": 0.9,
-        "w_bar_scatter": 0.4,
+        "w_bar_error": 0.1,
         "beta": -0.1,
         "shares": shares,
         "residual_share": 0.0,
@@ -60,6 +60,9 @@ def test_table_names_what_differs() -> None:
     other = shaken.Shaking(1.0, 11.4)
     (line,) = shaken.rows({case.name: found}, [case, other])[2:]
     assert "| 4 g, 11.4 Hz | 16 | σ = 0, seed 2 | 0.90 ± 0.10 | −0.100 |" in line
+    # what was kept without an error is printed without one
+    del found["w_bar_error"]
+    assert "| 0.90 | −0.100 |" in shaken.rows({case.name: found}, [case])[-1]
 
 
 def test_what_is_kept_belongs_to_cases_that_can_be_computed_again() -> None:
