@@ -47,7 +47,9 @@ class Misfit:
         >>> str(Misfit(0.91, 0.03)), str(Misfit(float("nan"), float("nan")))
         ('0.91 ± 0.03', '–')
         """
-        return "–" if math.isnan(self.value) else f"{self.value:.2f} ± {self.standard_error:.2f}"
+        if math.isnan(self.value):
+            return "–"
+        return f"{self.value:.2f}" + ("" if math.isnan(self.standard_error) else f" ± {self.standard_error:.2f}")
 
 
 def misfit(liquid: Liquid, points: Sequence[DrivenPoint]) -> Misfit:
@@ -63,7 +65,8 @@ def misfit(liquid: Liquid, points: Sequence[DrivenPoint]) -> Misfit:
         return Misfit(math.nan, math.nan)
     means = [liquid[point].w_bar for point in points]
     distances = [abs(mean.value - laboratory_w_bar(point)) for mean, point in zip(means, points, strict=True)]
-    errors = [0.0 if math.isnan(mean.standard_error) else mean.standard_error for mean in means]
+    # an error that is not known is not zero: nothing is then beyond chance
+    errors = [mean.standard_error for mean in means]
     return Misfit(sum(distances) / len(points), math.hypot(*errors) / len(points))
 
 

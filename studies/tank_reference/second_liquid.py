@@ -23,7 +23,7 @@ FEWEST_STARTS: Final = 3
 
 
 def second_liquid(place: Path = PLACE) -> dict[DrivenPoint, PointValues]:
-    """W̄ and β at the common points, of the finest of the usual cases, over its starts; nothing where the file is not there.
+    """W̄ and β at the common points, of the finest usual cases over their starts; nothing if there is no file.
 
     Parameters
     ----------

@@ -94,6 +94,6 @@ def standard_error_of_correlated(values: ArrayLike) -> float:
 
 
 def _window_is_wide(twice_time: float, lag: int, n: int) -> bool:
-    """Whether cutting off beyond `lag` costs less than the noise that another lag brings, Wolff's (51) and (52)."""
+    """Whether cutting off beyond `lag` costs less than the noise of another lag, Wolff's (51) and (52)."""
     time = 1.5 / math.log((twice_time + 1) / (twice_time - 1)) if twice_time > 1 else 1e-9
     return math.exp(-lag / time) - time / math.sqrt(lag * n) < 0

@@ -3,11 +3,13 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
+import xarray as xr
 
 import studies.two_phase_verification as room
 from acquisition.two_phase_tank.setup import Fluids
-from studies.two_phase_verification import cases, shaken
+from studies.two_phase_verification import cases, maps, shaken
 from studies.two_phase_verification.linear_theory import Layers
 
 KEPT = Path(room.__file__).with_name("shaken.json")
@@ -71,3 +73,37 @@ def test_what_is_kept_belongs_to_cases_that_can_be_computed_again() -> None:
     for name, found in kept.items():
         assert shaken.Shaking(**found["case"]).name == name
         assert abs(found["volume_change"]) < 1e-9
+
+
+def test_maps_put_values_where_they_belong() -> None:
+    kept = shaken.Shaking(3.0, 11.0, 24, 16)
+    of_gas = maps.second_map({kept.name: {"w_bar": 0.7, "beta": -0.2}}, "w_bar")
+    place = maps.LEVELS_G.index(3.0), maps.FREQUENCIES_HZ.index(11.0)
+    assert of_gas[place] == 0.7
+    assert np.isnan(of_gas).sum() == of_gas.size - 1
+    windows = xr.Dataset(
+        {
+            "acceleration_g": ("window", [3.0, 3.1, 3.0, 3.0]),
+            "frequency_hz": ("window", [11.0, 10.9, 12.0, 11.0]),
+            "fill_level": ("window", [0.5, 0.5, 0.5, 0.25]),
+            "w_bar": ("window", [1.0, 1.4, 9.0, 9.0]),
+        }
+    )
+    of_particles = maps.first_map(windows, "w_bar")
+    # 12 Hz is near 12.5 Hz
+    assert of_particles[place] == pytest.approx(1.2)
+    assert of_particles[place[0], place[1] + 1] == 9.0
+    assert np.isnan(of_particles).sum() == of_particles.size - 2
+
+
+def test_facts_of_a_map_that_is_known() -> None:
+    """ω̄ = 3 … 5 is 9.1 to 15.1 Hz in a box of 27.2 mm; 4 g at 11 Hz moves it by 8.2 mm, ū = 0.302."""
+    w_bar = np.full((len(maps.LEVELS_G), len(maps.FREQUENCIES_HZ)), 5.0)
+    w_bar[:, 1:5] = np.arange(len(maps.LEVELS_G))[:, None]
+    w_bar[maps.LEVELS_G.index(4.0), 2] = 9.0
+    beta = np.where(np.arange(w_bar.size) % 4 == 0, 0.1, -0.1).reshape(w_bar.shape)
+    found = maps.facts({"w_bar": w_bar, "beta": beta})
+    assert (found["mean at 0.5 g"], found["mean at 6 g"], found["mean at 4 g"]) == (0.0, 7.0, 6.0)
+    assert (found["largest"], found["its level"], found["β < 0"]) == (9.0, 4.0, 0.75)
+    assert found["its ū"] == pytest.approx(4 * 9.80665 / (2 * np.pi * 11) ** 2 / 0.0272)
+    assert maps.maps_figure({"w_bar": w_bar, "beta": beta}, {"w_bar": w_bar, "beta": beta}).startswith(b"\x89PNG")
