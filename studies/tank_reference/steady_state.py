@@ -61,8 +61,8 @@ def standard_error_of_correlated(values: ArrayLike) -> float:
     """Standard error of the mean of consecutive values that are correlated over an unknown time.
 
     The variance of one value times twice the integrated correlation time over the number of values,
-    (31), (35) and (49) of Wolff (2004), Comput. Phys. Commun. 156, 143; the sum of the correlations
-    ends at the first lag where what is cut off is less than what chance adds, (52), with S = 1.5.
+    the gamma method of Wolff (2004), Comput. Phys. Commun. 156, 143; the sum of the correlations
+    ends at the first lag where what is cut off is less than what chance adds, with S = 1.5.
 
     Parameters
     ----------
@@ -94,6 +94,6 @@ def standard_error_of_correlated(values: ArrayLike) -> float:
 
 
 def _window_is_wide(twice_time: float, lag: int, n: int) -> bool:
-    """Whether cutting off beyond `lag` costs less than the noise of another lag, Wolff's (51) and (52)."""
+    """Whether cutting off beyond `lag` costs less than the noise of another lag, by Wolff's automatic window."""
     time = 1.5 / math.log((twice_time + 1) / (twice_time - 1)) if twice_time > 1 else 1e-9
     return math.exp(-lag / time) - time / math.sqrt(lag * n) < 0
