@@ -3,14 +3,12 @@
 Each measurement runs in a process of its own, on one core. Times are processor times, the best of several
 repeats after a warm-up that compiles the kernels; starts of commands are timed by the clock, and so are training
 and diagnoses, which run once, on two cores. The parent prints the table, says where a figure misses its
-aim, and keeps the figures with the name of the machine in results/bench.json.
+aim, and keeps the figures with the name of the machine in results/bench.json. A group that fails is named with the
+last line that it said, and the others are measured all the same.
 """
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
@@ -31,6 +29,7 @@ from tests.benchmarks.diagnosis import MEMORY_LABEL as DIAGNOSIS_MEMORY_LABEL
 from tests.benchmarks.flutter import FORCES_LABEL, KEPT_LABEL, LOCUS_LABEL
 from tests.benchmarks.history import described, keep
 from tests.benchmarks.numerical_tank import RESOLUTIONS, SIDE_BY_SIDE, label, tank_figures
+from tests.benchmarks.own_process import last_line, measured_apart
 from tests.benchmarks.own_twin import STEPS_LABEL
 from tests.benchmarks.reduced_order_model import MEMORY_LABEL, PRODUCT_LABEL, TIME_LABEL, model_figures
 from tests.benchmarks.reduced_order_model_in_the_twin import LOOP_LABEL
@@ -87,12 +86,8 @@ ONE_CORE = {
 
 
 def measured(what: str, *arguments: object) -> dict[str, float]:
-    """Run one measurement of `tests.benchmarks.measurements` in a process of its own."""
-    command = [sys.executable, "-m", "tests.benchmarks.measurements", what, *map(str, arguments)]
-    done = subprocess.run(command, env=os.environ | ONE_CORE, capture_output=True, text=True, check=False)
-    if done.returncode:
-        sys.exit(done.stderr)
-    return json.loads(done.stdout.splitlines()[-1])
+    """Run one measurement of `tests.benchmarks.measurements` in a process of its own, on one core."""
+    return measured_apart("tests.benchmarks.measurements", what, *arguments, environment=ONE_CORE)
 
 
 def recording_figures() -> dict[str, float]:
@@ -167,17 +162,24 @@ GROUPS: dict[str, Callable[[], dict[str, float]]] = {
 
 
 def main() -> None:
-    """Measure the groups that are named, or all; print, keep, and end with 1 if an aim is missed."""
+    """Measure the groups that are named, or all; print, keep; end with 1 if an aim is missed or a group failed."""
     asked = sys.argv[1:] or list(GROUPS)
     if unknown := set(asked) - set(GROUPS):
         sys.exit(f"benchmarks: got {', '.join(sorted(unknown))}; allowed: {', '.join(GROUPS)}")
-    about, figures = described(), dict[str, float]()
+    about, figures, failed = described(), dict[str, float](), []
     for name in asked:
         print(f"{name} …", flush=True)
-        own = GROUPS[name]()
+        try:
+            own = GROUPS[name]()
+        except (Exception, SystemExit) as error:  # noqa: BLE001 – whatever it was, the others are measured
+            failed.append(f"{name}: FAILED: {last_line(str(error)) or type(error).__name__}")
+            print(failed[-1], flush=True)
+            continue
         keep(own, about)  # after each: an interrupted run leaves what it has measured
         figures |= own
-    sys.exit(1 if printed(figures) else 0)
+    n_missed = printed(figures)
+    print(*failed, sep="\n", end="\n" if failed else "")
+    sys.exit(1 if n_missed or failed else 0)
 
 
 def printed(figures: dict[str, float]) -> int:

@@ -6,7 +6,6 @@ import argparse
 import importlib.util
 import json
 import os
-import subprocess
 import sys
 import tempfile
 import time
@@ -19,6 +18,7 @@ from campaigns.store import Store
 from campaigns.stored_task import StoredTask
 from campaigns.task import Task
 from campaigns.working import work_through
+from tests.benchmarks.own_process import measured_apart
 
 OVERHEAD_LABEL = "campaign: overhead per task [ms]"
 RATIO_LABEL = "campaign: time of one process over that of two"
@@ -145,12 +145,7 @@ def _resident_mb(pid: int) -> float:
 def campaign_figures() -> dict[str, float]:
     """All figures, in a process of their own, which may use two cores."""
     print("campaigns of stubs …", flush=True)
-    done = subprocess.run(
-        [sys.executable, "-m", "tests.benchmarks.campaigns"], capture_output=True, text=True, check=False
-    )
-    if done.returncode:
-        sys.exit(done.stderr)
-    return dict(json.loads(done.stdout.splitlines()[-1]))
+    return measured_apart("tests.benchmarks.campaigns")
 
 
 if __name__ == "__main__":

@@ -15,6 +15,8 @@ import time
 from collections.abc import Iterator, Mapping
 from typing import Final
 
+from tests.benchmarks.own_process import MeasurementError
+
 LEVEL_G, FREQUENCY_HZ = 3.0, 11.4
 RUN_UP_S, STRETCH_S = 0.6, 0.25
 N_REPEATS: Final = 4
@@ -70,7 +72,7 @@ def _answer(run: subprocess.Popen[str]) -> dict[str, float]:
     assert run.stdout is not None
     line = run.stdout.readline()
     if not line:
-        sys.exit("numerical tank: the measured process ended before its time")
+        raise MeasurementError("the measured process ended before its time")
     return json.loads(line)
 
 

@@ -10,9 +10,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import os
 import resource
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -24,6 +22,7 @@ from numpy.typing import NDArray
 
 from sloshlab.reduced_order_model.fit_quality import fit_quality
 from sloshlab.reduced_order_model.regressors import Delays, Run, blocks
+from tests.benchmarks.own_process import measured_apart
 
 FloatArray = NDArray[np.float64]
 RECORDINGS: Final = Path("raw_data/numerical_tank/shaker")
@@ -65,11 +64,7 @@ def model_figures() -> dict[str, float]:
 
 
 def _measured(what: str, *arguments: object) -> dict[str, float]:
-    command = [sys.executable, "-m", "tests.benchmarks.reduced_order_model", what, *map(str, arguments)]
-    done = subprocess.run(command, env=os.environ | TWO_CORES, capture_output=True, text=True, check=False)
-    if done.returncode:
-        sys.exit(done.stderr)
-    return json.loads(done.stdout.splitlines()[-1])
+    return measured_apart("tests.benchmarks.reduced_order_model", what, *arguments, environment=TWO_CORES)
 
 
 def signals() -> tuple[Run, Run, float]:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from pathlib import Path
 
 import pytest
 
 from tests.benchmarks.__main__ import AIMS, AT_LEAST, GROUPS
 from tests.benchmarks.history import HISTORY, described, draw, keep, machine, over_aims, with_entry
+from tests.benchmarks.own_process import MeasurementError, measured_apart
 
 
 def run(revision: str, **figures: float) -> dict[str, object]:
@@ -64,3 +66,47 @@ def test_a_group_that_is_not_there_is_refused(monkeypatch: pytest.MonkeyPatch) -
     with pytest.raises(SystemExit, match=r"got twins; allowed: analysis, twin"):
         main()
     assert {"analysis", "formats", "flights", "scaling"} <= set(GROUPS)
+
+
+def test_a_group_that_fails_is_named_and_the_others_are_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from tests.benchmarks import __main__ as bench
+
+    def crashed() -> dict[str, float]:
+        return measured_apart("timeit", "-n", "1", "-r", "1", "raise ValueError('the sensor fell off')")
+
+    def left() -> dict[str, float]:
+        sys.exit("nobody recorded")
+
+    groups = {"first": crashed, "second": lambda: {"seconds": 1.0}, "third": left, "last": lambda: {"ratio": 2.0}}
+    monkeypatch.setattr(bench, "GROUPS", groups)
+    monkeypatch.setattr("sys.argv", ["benchmarks"])
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        bench.main()
+    assert ended.value.code == 1
+    assert json.loads(Path("results/bench.json").read_text(encoding="utf-8"))["figures"] == {
+        "seconds": 1.0,
+        "ratio": 2.0,
+    }
+    said = capsys.readouterr().out.splitlines()
+    assert said[-2:] == ["first: FAILED: ValueError: the sensor fell off", "third: FAILED: nobody recorded"]
+    assert any(line.split() == ["ratio", "2"] for line in said)
+
+
+def test_figures_of_a_process_are_its_last_line_and_anything_else_is_an_error() -> None:
+    assert measured_apart("tests.benchmarks.measurements", "blas")["product_s"] > 0
+    with pytest.raises(MeasurementError, match="printed no figures"):
+        measured_apart("this")
+
+
+def test_a_run_without_misses_and_failures_ends_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from tests.benchmarks import __main__ as bench
+
+    monkeypatch.setattr(bench, "GROUPS", {"only": lambda: {"seconds": 1.0}})
+    monkeypatch.setattr("sys.argv", ["benchmarks", "only"])
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        bench.main()
+    assert ended.value.code == 0
