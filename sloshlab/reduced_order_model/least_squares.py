@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -58,6 +59,8 @@ class OneStepProblem:
         So many parameters in a row, of those that are not linear, are damped by the mean of their squares: the
         coordinates of a centre whose directions are of no size in common. By their own squares those along
         which regressors hardly vary would be damped hardly at all.
+    every : int
+        Σ J Jᵀ is that of every so manieth sample, times this number; all others are sums over all samples.
     """
 
     backend: ArrayBackend
@@ -65,14 +68,30 @@ class OneStepProblem:
     blocks: Callable[[], Iterator[tuple[Any, Any]]]
     is_delay_line: bool = False
     n_alike: int = 1
+    every: int = 1
 
     def normal_sums(self, theta: Array) -> NormalSums:
         """Return Σ J Jᵀ, Σ J e, Σ e²."""
         sums = self.network.normal_sums(self.backend.xp, theta, is_delay_line=self.is_delay_line)
-        for phi, target in self.blocks():
+        for phi, target in thinned(self.blocks(), self.every):
             sums.add(self.backend.asarray(phi), self.backend.asarray(target))
         found = sums.sums()
+        if self.every > 1:
+            found = self._with_all_samples(theta, found.matrix)
         return found if self.n_alike == 1 else replace(found, scale=self._scale(found.matrix))
+
+    def _with_all_samples(self, theta: Array, thin: Array) -> NormalSums:
+        """The matrix of some samples beside gradient and squares of all."""
+        gradient: Array = 0.0
+        squares, n_samples, n_taken = 0.0, 0, 0
+        for phi, target in self.blocks():
+            found, by_theta = self.network.squares_and_gradient(
+                self.backend.xp, theta, self.backend.asarray(phi), self.backend.asarray(target)
+            )
+            squares, gradient = squares + found, gradient + by_theta
+            n_samples, n_taken = n_samples + target.shape[0], n_taken + -(-target.shape[0] // self.every)
+        # of Σ e² by θ, e = output − target there
+        return NormalSums(thin * (n_samples / n_taken), -0.5 * gradient, squares)
 
     def _scale(self, matrix: Array) -> Array:
         xp, n = self.backend.xp, self.network.n_parameters - self.network.n_linear
@@ -101,6 +120,23 @@ class OneStepProblem:
         squares += float(linear @ (matrix @ linear)) - 2 * float(linear @ moments)
         # linear parameters come last in θ for this
         return xp.concat([theta[:-n_linear], linear]), squares
+
+
+def thinned(blocks: Iterator[tuple[Any, Any]], every: int) -> Iterator[tuple[Any, Any]]:
+    """Every so manieth sample of each block, in blocks of about the same size.
+
+    Parameters
+    ----------
+    blocks : iterator of (array, array)
+        Regressors, one column per sample, and outputs.
+    every : int
+    """
+    if every == 1:
+        yield from blocks
+        return
+    while some := list(islice(blocks, every)):
+        phi = np.concatenate([phi[:, ::every] for phi, _ in some], axis=1)
+        yield phi, np.concatenate([target[::every] for _, target in some])
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,10 @@ BLOCK: Final = 1024
 _LINE_BLOCK: Final = 8192
 """Samples at once where sums are correlations: enough stretches for quick products."""
 _LARGEST_INITIAL: Final = 20_000
+_SAMPLES_PER_PARAMETER: Final = 100
+"""The curvature of so many samples differs from that of very many by about a fifth in any direction (eigenvalues
+(1 ± √(p/n))² of a covariance of p numbers in n samples, Marchenko & Pastur 1967), while the damping that is added
+to it changes by factors of 4. Gradient and error are always those of all samples (Byrd et al. 2011)."""
 
 
 @dataclass(frozen=True)
@@ -264,6 +268,8 @@ def _train_once(
         lambda: blocks(task.training, task.delays, size),
         is_line,
         n_alike=1 if task.delays.inputs else task.network.n_inputs,
+        # of a delay line moments are correlations, which know no gaps
+        every=1 if is_line else max(1, n_samples(task.training, task.delays) // _enough(task.network)),
     )
     # NOE starts from a trained NARX, as in the source (2.2)
     stages: list[tuple[LeastSquaresProblem, ArrayBackend]] = [(one_step, task.backend)]
@@ -331,6 +337,11 @@ def _descend(
     if best.epoch is not None and best.epoch.start == start:
         best.ended = ended
     return task.backend.to_numpy(theta), number
+
+
+def _enough(network: Network) -> int:
+    """Samples from which the curvature of a sum of squares is known well enough for a step."""
+    return _SAMPLES_PER_PARAMETER * network.n_parameters
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,7 @@ class DelayLineSums(PairSums):
         self._has_samples = False
         self._spectra: Array = 0.0  # Σ F W conj(F z), shape (frequencies, pairs of neurons, p + 1)
         m = self._network.n_neurons
+        self._neurons = [self._xp.asarray(part, device=device(self._theta)) for part in np.triu_indices(m)]
         self._upper = self._neurons[0] * m + self._neurons[1]
         self._zeroth: Array = 0.0  # Σ W
 

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from sloshlab.reduced_order_model.array_backend import Array
 from sloshlab.reduced_order_model.networks.network import NormalSums
 
-_AT_ONCE: Final = 1024
-"""Samples; with more, the products of all pairs leave the cache."""
+_AT_ONCE: Final = 512
+"""Samples; with more, the rows of the Jacobian leave the cache."""
 
 
 class CentredNetwork(Protocol):
@@ -54,16 +54,11 @@ class PairSums:
 
     def __init__(self, xp: Any, network: CentredNetwork, theta: Array) -> None:
         self._xp, self._network, self._theta = xp, network, theta
-        self._neurons = self._pairs(network.n_neurons)
-        self._mixed: Array = 0.0  # Σ Φ_i G_j φ̃_a
-        self._weights: Array = 0.0  # Σ Φ_i Φ_j
-        self._by_centre: Array = 0.0  # Σ e G_i φ̃_a
-        self._by_weight: Array = 0.0  # Σ e Φ_i
+        # rows are neurons j and coordinates a, columns neurons i, and last the error: Σ G_j φ̃_a (Φ_i, e)
+        self._mixed: Array = 0.0
+        self._weights: Array = 0.0  # Σ Φ_i (Φ_j, e)
         self._squares = 0.0
         self._prepare()
-
-    def _pairs(self, n: int) -> list[Array]:
-        return [self._xp.asarray(part, device=device(self._theta)) for part in np.triu_indices(n)]
 
     def add(self, phi: Array, target: Array) -> None:
         """Take some samples."""
@@ -73,35 +68,33 @@ class PairSums:
         extended = xp.concat([phi, xp.ones_like(phi[:1, :])], axis=0)
         # φ̃ = (φ, 1) carries first and zeroth moments along with the second ones
         self._add_second(factors, extended)
+        # the error as one more column: the gradient comes with the same product
+        columns = xp.concat([features, error[None, :]], axis=0)
         for first in range(0, phi.shape[1], _AT_ONCE):
             part = slice(first, min(first + _AT_ONCE, phi.shape[1]))
-            crossed = features[:, None, part] * factors[None, :, part]
-            self._mixed = self._mixed + xp.reshape(crossed, (-1, crossed.shape[2])) @ extended[:, part].T
-        self._weights = self._weights + features @ features.T
-        self._by_centre = self._by_centre + (factors * error[None, :]) @ extended.T
-        self._by_weight = self._by_weight + features @ error
+            # coordinates of the centres have more rows than all pairs of neurons have columns
+            rows = factors[:, None, part] * extended[None, :, part]
+            self._mixed = self._mixed + xp.reshape(rows, (-1, rows.shape[2])) @ columns[:, part].T
+        self._weights = self._weights + features @ columns.T
         self._squares += float(xp.sum(error * error))
 
     def sums(self) -> NormalSums:
         """Return the sums."""
         xp = self._xp
         centres, _ = self._network.parts(xp, self._theta)
-        mixed = self._mixed_block(centres)
-        upper = xp.concat([self._centre_block(centres), mixed.T], axis=1)
-        matrix = xp.concat([upper, xp.concat([mixed, self._weights], axis=1)], axis=0)
-        by_centre = self._by_centre[:, :-1] - centres * self._by_centre[:, -1:]
-        gradient = xp.concat([xp.reshape(by_centre, (-1,)), self._by_weight])
+        by_centre = self._centre_rows(centres)
+        mixed = by_centre[:, :-1]
+        upper = xp.concat([self._centre_block(centres), mixed], axis=1)
+        matrix = xp.concat([upper, xp.concat([mixed.T, self._weights[:, :-1]], axis=1)], axis=0)
+        gradient = xp.concat([by_centre[:, -1], self._weights[:, -1]])
         return NormalSums(matrix, gradient, self._squares)
 
     def _prepare(self) -> None:
-        self._inputs = self._pairs(self._network.n_inputs + 1)
         self._second: Array = 0.0  # Σ G_i G_j φ̃_a φ̃_b, a row per pair of neurons, a column per pair of inputs
 
     def _add_second(self, factors: Array, extended: Array) -> None:
         xp = self._xp
-        self._second = self._second + _pair_products(xp, factors, self._neurons) @ (
-            _pair_products(xp, extended, self._inputs).T
-        )
+        self._second = self._second + _pair_products(xp, factors) @ _pair_products(xp, extended).T
 
     def _second_moments(self) -> Array:
         """Σ G_i G_j φ̃_a φ̃_b, a row per pair of neurons, a column per (a, b)."""
@@ -123,15 +116,22 @@ class PairSums:
         )
         return xp.reshape(xp.permute_dims(block, (0, 2, 1, 3)), (m * p, m * p))
 
-    def _mixed_block(self, centres: Array) -> Array:
-        """Σ Φ_i G_j (φ − c_j); rows are linear parameters, columns coordinates of the centres."""
+    def _centre_rows(self, centres: Array) -> Array:
+        """Σ G_j (φ − c_j) (Φ_i, e): a row per coordinate of a centre, a column per weight and one for e."""
         xp, (m, p) = self._xp, centres.shape
-        moments = xp.reshape(self._mixed, (-1, m, p + 1))
-        return xp.reshape(moments[:, :, :-1] - moments[:, :, -1:] * centres[None, :, :], (-1, m * p))
+        moments = xp.reshape(self._mixed, (m, p + 1, -1))
+        return xp.reshape(moments[:, :-1, :] - centres[:, :, None] * moments[:, -1:, :], (m * p, -1))
 
 
-def _pair_products(xp: Any, rows: Array, pairs: list[Array]) -> Array:
-    return xp.take(rows, pairs[0], axis=0) * xp.take(rows, pairs[1], axis=0)
+def _pair_products(xp: Any, rows: Array) -> Array:
+    """Rows i ≤ j multiplied, in the order of `numpy.triu_indices`."""
+    n = rows.shape[0]
+    found = xp.empty((n * (n + 1) // 2, rows.shape[1]), dtype=rows.dtype, device=device(rows))
+    end = 0
+    for i in range(n):
+        start, end = end, end + n - i
+        found[start:end, :] = rows[i, :] * rows[i:, :]
+    return found
 
 
 def places(n: int) -> NDArray[np.int64]:

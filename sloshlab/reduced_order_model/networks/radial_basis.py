@@ -151,9 +151,13 @@ class NormalisedRadialBasis(_RadialBasisNetwork):
         """Return shares of the neurons, shape (n_neurons, m), of which each column sums to 1."""
         centres, _ = self.parts(xp, theta)
         # ‖φ‖² is common to all neurons and cancels in the shares; left out, it costs no digits
-        exponents = 2 * (centres @ phi) - xp.sum(centres * centres, axis=1)[:, None]
-        shares = xp.exp(exponents - xp.max(exponents, axis=0)[None, :])
-        return shares / xp.sum(shares, axis=0)[None, :]
+        exponents = (2 * centres) @ phi
+        # in place: fresh memory for every step of this costs a third of it
+        exponents -= xp.sum(centres * centres, axis=1)[:, None]
+        exponents -= xp.max(exponents, axis=0)[None, :]
+        shares = xp.exp(exponents)
+        shares /= xp.sum(shares, axis=0)[None, :]
+        return shares
 
     def _centre_factors(self, xp: Any, linear: Array, features: Array, output: Array) -> Array:
         # derivative of a share: moving one centre takes from all others

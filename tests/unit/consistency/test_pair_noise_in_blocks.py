@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sloshlab.consistency.sensor_response import pair_noise
+from sloshlab.consistency.sensor_response import _Blocks, _reach_and_noise, pair_noise
 
 N, N_BLOCK = 40_150, 500
 
@@ -43,3 +43,20 @@ def test_blocks_give_what_whole_arrays_give(lost):
     )
     # a ratio of means of some thousand terms
     assert pair.compression == pytest.approx(1 - max(ends) / np.mean(middle), abs=1e-11)
+
+
+@pytest.mark.parametrize("n_blocks", [3, 4, 17])
+def test_the_reach_lies_between_two_readings(n_blocks):
+    """Readings that grow by a fifth from one to the next: any other place between two is seen."""
+    n_block = 50
+    n = n_blocks * n_block
+    generator = np.random.default_rng(9)
+    # of both signs, in any order, and with no mean of a block taken off
+    y = generator.permutation(1.2 ** np.linspace(0.0, 150.0, n)) * generator.choice([-1.0, 1.0], n)
+    chosen = np.arange(n_blocks)
+    reach, noise = _reach_and_noise(
+        _Blocks(y, np.zeros(n), n_block), chosen, np.zeros(n_blocks), np.zeros(n_blocks)
+    )
+    assert reach == pytest.approx(np.quantile(np.abs(y), 0.995), rel=1e-12)
+    errors = np.abs(np.diff(y, 4))[:] / 6  # zero for two samples at both ends
+    assert noise == pytest.approx(errors.sum() / n, rel=1e-9)

@@ -6,12 +6,14 @@ import pytest
 
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.reduced_order_model import free_run
+from sloshlab.reduced_order_model import training as training_module
 from sloshlab.reduced_order_model.array_backend import ArrayBackend, array_backend
 from sloshlab.reduced_order_model.early_stop import EarlyStop
 from sloshlab.reduced_order_model.fit_quality import fit_quality
 from sloshlab.reduced_order_model.least_squares import OneStepProblem, Step, next_step
 from sloshlab.reduced_order_model.model import ReducedOrderModel, Scaling
 from sloshlab.reduced_order_model.networks.network import NormalSums
+from sloshlab.reduced_order_model.networks.pair_sums import PairSums
 from sloshlab.reduced_order_model.networks.radial_basis import NormalisedRadialBasis, RadialBasis
 from sloshlab.reduced_order_model.regressors import Delays, Run, blocks, n_samples, segments
 from sloshlab.reduced_order_model.storage import load_model, save_model
@@ -115,6 +117,52 @@ def test_linear_parameters_are_solved_for(network):
     assert sums.squares == pytest.approx(squares)
     assert np.abs(sums.gradient[-network.n_linear :]).max() < 1e-6 * np.sqrt(squares)
     assert squares < problem.normal_sums(theta).squares
+
+
+@pytest.mark.parametrize("every", [3, 10])
+def test_a_matrix_of_some_samples_goes_with_gradient_and_error_of_all(every):
+    runs = [network_run(303, 5, noise=0.3), network_run(157, 6, noise=0.3)]
+    network = NormalisedRadialBasis(2, 4)
+    theta = np.random.default_rng(2).normal(size=network.n_parameters)
+    parts = list(blocks(runs, Delays.tapped(2), 77))
+    problem = OneStepProblem(array_backend(), network, lambda: iter(parts), n_alike=2, every=every)
+    sums = problem.normal_sums(theta)
+
+    def output(parameters, phi):
+        centres, weights = parameters[:8].reshape(4, 2), parameters[8:]
+        gaussians = np.exp(-((phi[None] - centres[:, :, None]) ** 2).sum(axis=1))
+        return weights @ gaussians / gaussians.sum(axis=0)
+
+    def slopes(phi):
+        changes = 1e-6 * np.eye(theta.size)
+        return np.array([(output(theta + d, phi) - output(theta - d, phi)) / 2e-6 for d in changes])
+
+    errors = [target - output(theta, phi) for phi, target in parts]
+    n_samples = sum(error.size for error in errors)
+    taken = np.concatenate([slopes(phi)[:, ::every] for phi, _ in parts], axis=1)
+    matrix = taken @ taken.T * n_samples / taken.shape[1]
+    assert sums.squares == pytest.approx(sum(error @ error for error in errors), rel=1e-12)
+    gradient = sum(slopes(phi) @ error for (phi, _), error in zip(parts, errors, strict=True))
+    # central differences of the outputs
+    np.testing.assert_allclose(sums.gradient, gradient, atol=1e-7 * np.abs(gradient).max())
+    np.testing.assert_allclose(sums.matrix, matrix, atol=1e-7 * np.abs(matrix).max())
+    np.testing.assert_allclose(sums.scale[:2], np.diagonal(matrix)[:2].mean(), rtol=1e-6)
+
+
+def test_a_long_training_recovers_a_network_from_the_curvature_of_some_samples(monkeypatch):
+    monkeypatch.setattr(training_module, "_SAMPLES_PER_PARAMETER", 10)
+    seen = []
+    add = PairSums.add
+    monkeypatch.setattr(PairSums, "add", lambda sums, phi, y: seen.append(y.size) or add(sums, phi, y))
+    runs, steps = [network_run(700, 1)], []
+    spread = np.sqrt(2) * np.nanstd(runs[0].x)
+    # in this order no delay line, whose moments would be correlations
+    settings = {"input_spread": spread, "n_starts": 1, "on_epoch": steps.append}
+    _, record = trained(runs, [network_run(300, 3)], Delays((2, 1)), **settings)
+    # 698 samples and 9 parameters: every seventh
+    assert set(seen) == {100}
+    assert len(seen) <= len(steps)
+    assert record.best.validation_mse < 1e-12
 
 
 class Parabola:
