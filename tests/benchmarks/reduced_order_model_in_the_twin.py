@@ -20,7 +20,8 @@ from sloshlab.rig import Rig
 from sloshlab.twin.excitation import free
 from sloshlab.twin.reduced_order_model_force import term_of
 from sloshlab.twin.twin import Twin
-from tests.benchmarks.twin import DEFLECTION_M, beam, best_of
+from tests.benchmarks.measurements import best_of
+from tests.benchmarks.twin import DEFLECTION_M, beam
 
 N_DELAYS, N_NEURONS, MODEL_RATE_HZ = 60, 20, 512.0
 OUTPUT_RATE_HZ, N_STEPS = 1024.0, 2
