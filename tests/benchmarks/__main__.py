@@ -31,7 +31,7 @@ from tests.benchmarks.history import described, keep
 from tests.benchmarks.numerical_tank import RESOLUTIONS, SIDE_BY_SIDE, label, tank_figures
 from tests.benchmarks.own_process import last_line, measured_apart
 from tests.benchmarks.own_twin import STEPS_LABEL
-from tests.benchmarks.reduced_order_model import MEMORY_LABEL, PRODUCT_LABEL, TIME_LABEL, model_figures
+from tests.benchmarks.reduced_order_model import MEMORY_LABEL, TIME_LABEL, model_figures
 from tests.benchmarks.reduced_order_model_in_the_twin import LOOP_LABEL
 from tests.benchmarks.scaling import CHANNELS_LABEL, NETWORKS_LABEL, TANKS_LABEL
 from tests.benchmarks.twin import FREE_LABEL, LANES_LABEL, METHODS, RANDOM_LABEL, RIVAL_LABEL
@@ -75,7 +75,6 @@ AT_LEAST = {
     LANES_LABEL: 4.0,
     STEPS_LABEL: 2e6,
     SIDE_BY_SIDE: 1.8,
-    PRODUCT_LABEL: 0.5,
     RATIO_LABEL: 1.8,
     **{RIVAL_LABEL.format(method): 50.0 for method in METHODS},
 }

@@ -30,7 +30,6 @@ N_DELAYS, N_NEURONS, SPREAD = 70, 35, 2.0
 DELAYS: Final = Delays.tapped(N_DELAYS)
 TIME_LABEL: Final = "reduced-order model: NFIR 70×35 on 480 s [s]"
 MEMORY_LABEL: Final = "reduced-order model: its peak memory [GB]"
-PRODUCT_LABEL: Final = "reduced-order model: J Jᵀ by matrix product at the speed of BLAS, over an epoch"
 RIVALS: Final = {"scikit-learn": "sklearn", "PyTorch": "torch"}
 TWO_CORES: Final = {
     name: "2" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -44,7 +43,6 @@ def model_figures() -> dict[str, float]:
     figures = {
         TIME_LABEL: ours["training_s"],
         MEMORY_LABEL: ours["peak_gb"],
-        PRODUCT_LABEL: ours["product_s"] / ours["epoch_s"],
         "reduced-order model: epochs": ours["epochs"],
         "reduced-order model: time per epoch [s]": ours["epoch_s"],
         "reduced-order model: fit on the validation run [%]": ours["fit_percent"],
@@ -98,26 +96,13 @@ def ours() -> dict[str, float]:
         settings=TrainingSettings(input_spread=SPREAD), on_epoch=after_epoch,
     )  # fmt: skip
     training_s = time.perf_counter() - started
-    n_parameters = model.network.n_parameters
     return {
         "training_s": training_s,
         "epochs": len(record.epochs) - 1,
         "epoch_s": float(np.median(np.diff(times))),
-        "product_s": n_parameters**2 * training.x.size / blas_flops(),
         "peak_gb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e9,
         "fit_percent": fit_quality(validation.y, model.simulate(validation.x)).fit_percent,
     }
-
-
-def blas_flops() -> float:
-    """Floating-point operations per second in a product of matrices, the best of several."""
-    matrix = np.random.default_rng(0).standard_normal((2000, 2000))
-    times = []
-    for _ in range(5):
-        started = time.perf_counter()
-        matrix @ matrix
-        times.append(time.perf_counter() - started)
-    return 2 * 2000**3 / min(times)
 
 
 def rival_data() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
