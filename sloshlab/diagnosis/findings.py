@@ -18,7 +18,7 @@ from sloshlab.diagnosis.inference.scored_model import ScoredModel, scored
 from sloshlab.diagnosis.inference.whitened import whitened
 from sloshlab.diagnosis.selection.explained_scatter import ExplainedScatter
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
-from sloshlab.diagnosis.selection.model_selection import ModelSelection
+from sloshlab.diagnosis.selection.model_selection import N_KEPT, ModelSelection
 from sloshlab.diagnosis.surroundings import surroundings_of
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.identification.case import Case
@@ -41,7 +41,7 @@ assert effects.__all__  # importing the vocabulary makes it known
 FloatArray = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 _MOST_SCORED: Final = 16
-"""Models with effects, the lowest costs first: the others are too far behind to have any probability."""
+"""Models with effects, the lowest costs first, that could be the best."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +153,9 @@ def findings_of(
     believed_fit = FreeRunFit((), problem.values(problem.theta_of(model.believed)), 0.0, 0.0)
     score = Scoring(model, fitting, held_out, nothing, case.names_by_test())
     believed, retuned = score.required(believed_fit, "as believed"), score.required(nothing, "retuned")
-    explanations = [found for fit in with_effects[:_MOST_SCORED] if (found := score.of(fit, retuned)) is not None]
+    # Others are too far behind to have any probability; a few of them say by how much.
+    n_scored = min(max(sum(map(selection.may_win, with_effects)), N_KEPT), _MOST_SCORED)
+    explanations = [found for fit in with_effects[:n_scored] if (found := score.of(fit, retuned)) is not None]
     return Findings(
         case,
         model,

@@ -99,7 +99,7 @@ class ModelSelection:
                 self._settled(length)
         # What was found beside other effects may be the best alone, and has look-alikes of its own.
         for n in range(1, _MOST_EFFECTS + 1):
-            if any(self._may_win(fit) for fit in self._of(n)[:1]):
+            if any(self.may_win(fit) for fit in self._of(n)[:1]):
                 self._swapped(n)
         # What came up beside an effect may need none beside it.
         for n in range(_MOST_EFFECTS, 0, -1):
@@ -125,7 +125,7 @@ class ModelSelection:
     def _settled(self, n: int) -> None:
         """The best model of so many effects against others in their places, other numbers, and simpler ones."""
         best = self._best_of(n)
-        if best is None or not self._may_win(best):
+        if best is None or not self.may_win(best):
             return
         self._swapped(n)
         self._simplified(n)
@@ -260,6 +260,9 @@ class ModelSelection:
         news = [fit for fit in coarse if not self._is_known(few, fit, stages[-1])]
         # The best one first: what is far behind it is not fitted to the end.
         for some in (news[:1], news[1:]):
+            # A fit with instants of its own in each run may take as much as all that was begun before it.
+            if not only and not self._has_budget():
+                break
             hopeless = self._hopeless_cost()
             self._keep(
                 self.runs.model.executor.map(lambda fit: self._to_the_end(fit, bases[0], hopeless), some)  # noqa: B023
@@ -447,7 +450,7 @@ class ModelSelection:
         An effect without size would otherwise gain what is only a better optimum of what is nested in it, and the
         simpler of two forms may have been hopeless beside the other one on its way.
         """
-        for model in filter(self._may_win, self._leading(n)):
+        for model in filter(self.may_win, self._leading(n)):
             for effect in model.candidates:
                 place = (_keys_of(model.candidates), effect.key)
                 if self._simplified_at.get(place) is model.values:
@@ -485,8 +488,13 @@ class ModelSelection:
             ]
             self._grown([rest, believed], f"refining {effect.key}", [effect], {effect.key: [numbers, *places]})
 
-    def _may_win(self, model: FreeRunFit) -> bool:
-        """Whether what is nested in a model, which explains no more, could have the evidence of the best model."""
+    def may_win(self, model: FreeRunFit) -> bool:
+        """Whether what is nested in a model, which explains no more, could have the evidence of the best model.
+
+        Parameters
+        ----------
+        model : FreeRunFit
+        """
         best = min(self.fits.values(), key=lambda fit: fit.cost)
         return (model.cost - best.cost) / (2 * TEMPERING) < complexity(best) + NO_CHANCE
 
