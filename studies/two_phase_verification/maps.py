@@ -120,13 +120,13 @@ def maps_figure(first: Mapping[str, FloatArray], second: Mapping[str, FloatArray
         return png_bytes(figure)
 
 
-def facts(second: Mapping[str, FloatArray]) -> dict[str, float]:
+def facts(maps: Mapping[str, FloatArray]) -> dict[str, float]:
     """What of the source's facts a map of a half-filled tank can tell.
 
     Parameters
     ----------
-    second : mapping
-        Arrays by ``w_bar`` and ``beta``.
+    maps : mapping
+        Arrays by ``w_bar`` and ``beta``; NaN where nothing was measured.
 
     Returns
     -------
@@ -135,16 +135,16 @@ def facts(second: Mapping[str, FloatArray]) -> dict[str, float]:
         and the share of points where β < 0.
     """
     omega_bar = 2 * np.pi * np.array(FREQUENCIES_HZ) * np.sqrt(TANK.height_m / 9.80665)
-    w_bar = second["w_bar"]
+    w_bar, beta = maps["w_bar"], maps["beta"]
     band = (omega_bar >= 3) & (omega_bar <= 5)
-    found = {f"mean at {level_g:g} g": float(w_bar[i, band].mean()) for i, level_g in enumerate(LEVELS_G)}
+    found = {f"mean at {level_g:g} g": float(np.nanmean(w_bar[i, band])) for i, level_g in enumerate(LEVELS_G)}
     i, k = np.unravel_index(np.nanargmax(w_bar), w_bar.shape)
     found |= {
         "largest": float(w_bar[i, k]),
         "its level": LEVELS_G[i],
         "its ω̄": float(omega_bar[k]),
         "its ū": float(LEVELS_G[i] / omega_bar[k] ** 2),
-        "β < 0": float(np.mean(second["beta"] < 0)),
+        "β < 0": float(np.mean(beta[np.isfinite(beta)] < 0)),
     }
     return found
 

@@ -59,10 +59,10 @@ class ExplainedScatter:
         self._model, self._tests = model, tests
         self.fitting, self.held_out = [list(run) for run in fitting], [list(run) for run in held_out]
 
-    def is_explained(self, fit: FreeRunFit) -> bool:
-        """Whether a fit may explain what repeats differ by: an effect has numbers of its own in single runs.
+    def renew(self, fit: FreeRunFit) -> bool:
+        """Take the noise about a fit from here on, if it may explain what repeats differ by; whether it may.
 
-        The noise is that about the fit from then on.
+        It may where an effect has numbers of its own in single runs.
 
         Parameters
         ----------
@@ -99,18 +99,20 @@ def with_explained_scatter(
     place = {run[0].run.name: i for i, run in enumerate(runs) if run}
     found = [list(run) for run in runs]
     repeated: list[Observation] = []
+    alone = set(range(len(runs)))
     with suppress(SloshlabError):
         for test in tests:
             group = [place[name] for name in test if name in place]
             if len(group) < 2:
                 continue
+            alone -= set(group)
             left = [_residual(model, runs[i], fit) for i in group]
             for i, observed in zip(group, with_scatter([quiet[i] for i in group], left), strict=True):
                 found[i] = [_where_told(old, new) for old, new in zip(runs[i], observed, strict=True)]
                 repeated += found[i]
-        for i, run in enumerate(runs):
-            is_alone = run and found[i] == list(run)
-            if is_alone and repeated and not (isinstance(model, RigModel) and model.liquid_fluctuates(run[0].run)):
+        for i in sorted(alone) if repeated else ():
+            run = runs[i]
+            if run and not (isinstance(model, RigModel) and model.liquid_fluctuates(run[0].run)):
                 typical = with_typical_scatter(quiet[i], repeated)
                 found[i] = [_where_told(old, new) for old, new in zip(run, typical, strict=True)]
         return found

@@ -75,6 +75,7 @@ class ModelSelection:
         self._simplified_at: dict[tuple[frozenset[str], str], Mapping[str, float]] = {}
         self._promising: dict[str, list[dict[str, float]]] = {}
         self._reached = {1}
+        self._explaining = frozenset[str]()
 
     def selected(self, retuned: FreeRunFit) -> list[FreeRunFit]:
         """Fits of all models that were worth one, each at its best optimum; nothing first.
@@ -148,10 +149,11 @@ class ModelSelection:
         return [nothing, *better[:N_KEPT]]
 
     def _renew_scatter(self, best: FreeRunFit) -> bool:
-        """Noise by the scatter of repeats about a fit that explains some of it; whether it does."""
-        scatter, quiet = self._scatter, self._quiet
-        if scatter is None or not scatter.is_explained(best):
+        """Noise by the scatter of repeats about a fit that may explain some of it; whether it is another now."""
+        scatter, quiet, keys = self._scatter, self._quiet, _keys_of(best.candidates)
+        if scatter is None or keys == self._explaining or not scatter.renew(best):
             return False
+        self._explaining = keys
         self._quiet = FittedRuns(quiet.model, scatter.fitting, quiet.tests, quiet.effort)
         self._renew_sampling()
         # What looked alike in the noise of before may not do so now.
@@ -474,7 +476,9 @@ class ModelSelection:
         Friction and contacts make many local minima, and a baseline that stood in for the effect is at the bounds
         of several numbers, which hold each other there.
         """
-        for effect in best.candidates if self._has_budget() else ():
+        if not self._has_budget():
+            return
+        for effect in best.candidates:
             numbers, rest = _own_numbers(best, effect), _without(best, effect)
             believed = FreeRunFit(rest.candidates, {**rest.values, **self.runs.model.believed}, 0.0, 0.0)
             draws = norm.ppf(qmc.Halton(len(numbers), seed=0).random(8 * N_KEPT))

@@ -12,7 +12,7 @@ from test_external_force import FORCE_N, PERIOD_S, WIDTH_S, pulses
 
 from sloshlab.diagnosis.selection.explained_scatter import ExplainedScatter
 from sloshlab.identification.free_run_problem import FreeRunFit
-from sloshlab.identification.observations import Observation, observations, with_scatter
+from sloshlab.identification.observations import Observation, observations, with_scatter, with_typical_scatter
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_physics import effects
 from sloshlab.missing_physics.candidate import Candidate
@@ -64,9 +64,9 @@ def scattered(model: RigModel) -> list[list[Observation]]:
 def test_what_scatters_about_a_model_of_the_pulses_is_the_noise_of_the_sensors(model: RigModel) -> None:
     runs = scattered(model)
     scatter = ExplainedScatter(model, runs[:1], runs[1:], [list(STARTS_S)])
-    assert not scatter.is_explained(fit_of(model, with_pulses=False))
+    assert not scatter.renew(fit_of(model, with_pulses=False))
     assert scatter.fitting[0][0] is runs[0][0]
-    assert scatter.is_explained(fit_of(model, with_pulses=True))
+    assert scatter.renew(fit_of(model, with_pulses=True))
     for after in (*scatter.fitting, *scatter.held_out):
         for new in after:
             # white noise has the variance of its samples in every coefficient of an orthonormal transform
@@ -76,3 +76,19 @@ def test_what_scatters_about_a_model_of_the_pulses_is_the_noise_of_the_sensors(m
             assert float(np.median(inner)) == pytest.approx(expected, rel=0.3)
     tip_before, tip_after = (each[0][0].variance[2:-2, :12].mean() for each in (runs, scatter.fitting))
     assert tip_before > 20.0 * tip_after
+
+
+def test_a_run_that_was_not_repeated_scatters_as_the_repeats_do(model: RigModel) -> None:
+    """About the fit, too; where nothing was repeated all stays as it is."""
+    runs = scattered(model)
+    [other] = decays((0.006,), 6.0, noise=NOISE, seed=9)
+    alone = with_typical_scatter(
+        observations(replace(other, name="alone"), [each.channel for each in runs[0]]), [*runs[0], *runs[1]]
+    )
+    scatter = ExplainedScatter(model, [*runs, alone], [], [list(STARTS_S), ["alone"]])
+    assert scatter.renew(fit_of(model, with_pulses=True))
+    before, after = (float(each[0].variance[2:-2, :12].mean()) for each in (alone, scatter.fitting[2]))
+    assert before > 5.0 * after
+    single = ExplainedScatter(model, [runs[0]], [], [["first"], ["second"]])
+    assert single.renew(fit_of(model, with_pulses=True))
+    assert all(new is old for new, old in zip(single.fitting[0], runs[0], strict=True))
