@@ -161,6 +161,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("windows", type=Path, help="windows.nc of the particles' campaign, from make shaker")
     parser.add_argument("output", type=Path)
     chosen = parser.parse_args(arguments)
+    if not chosen.windows.is_file():
+        parser.error(f"got no file {chosen.windows}; allowed: windows.nc; remedy: make shaker")
     results = json.loads(KEPT.read_text())
     second = {name: second_map(results, name) for name in _RANGES}
     with xr.open_dataset(chosen.windows) as windows:
