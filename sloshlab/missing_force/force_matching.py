@@ -17,13 +17,22 @@ from typing import Final, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
+from scipy.linalg import orth
 from scipy.optimize import differential_evolution, least_squares
 
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.diagnosed_model import EXACT
 from sloshlab.identification.effort import Effort
 from sloshlab.identification.rig_model import steps_per_sample
-from sloshlab.missing_force.latent_force import EITHER, STRUCTURE, TANK, LatentForce, along, forces_alone
+from sloshlab.missing_force.latent_force import (
+    EITHER,
+    STRUCTURE,
+    TANK,
+    LatentForce,
+    RunForces,
+    along,
+    forces_alone,
+)
 from sloshlab.missing_physics.candidate import Candidate, Numbers
 from sloshlab.missing_physics.prior import ParameterPrior
 from sloshlab.twin.excitation import Excitation, with_cached_inputs
@@ -82,6 +91,8 @@ class ForceMatching:
     ----------
     forces : sequence of LatentForce
         Of one place, one per run.
+    undivided : ShownForces, optional
+        What structure and tank lack together in these runs, in which a force of this place shows as well.
     effort : Effort, optional
         That of a search, to which samples of forces are added.
 
@@ -93,19 +104,16 @@ class ForceMatching:
         Whether they are more than those of noise besides those of noise.
     """
 
-    def __init__(self, forces: Sequence[LatentForce], effort: Effort | None = None) -> None:
+    def __init__(
+        self, forces: Sequence[LatentForce], undivided: ShownForces | None = None, effort: Effort | None = None
+    ) -> None:
         self._effort, self._n_samples = effort or Effort(), sum(force.force_n.size for force in forces)
         self._drives = [_drive(force) for force in forces]
         self._doubled = [_drive(force, 2.0) for force in forces]
-        self._whiteners = [_Whitener(force) for force in forces]
-        moved = [np.concatenate([force.motion_before, force.motion]) for force in forces]
-        of_runs = [[*motion.T, np.ones(len(motion))] for motion in moved]
-        linear = np.stack([self._whitened(columns) for columns in zip(*of_runs, strict=True)], axis=1)
-        self._linear, _ = np.linalg.qr(linear / np.maximum(np.abs(linear).max(axis=0), 1e-300))
-        known = zip(forces, self._whiteners, strict=True)
-        missing = self._without_linear(np.concatenate([w.of_regularised(force.force_n) for force, w in known]))
+        self._shown = [ShownForces(forces, [forces]), *([] if undivided is None else [undivided])]
+        missing = np.concatenate([shown.missing for shown in self._shown])
         self.power = float(missing @ missing)
-        self.is_more_than_noise = self.power > 2.0 * sum(whitener.noise for whitener in self._whiteners)
+        self.is_more_than_noise = any(shown.is_more_than_noise for shown in self._shown)
         self._scale = max(float(np.sqrt(np.mean(missing**2))), 1e-300)
         self._missing = missing / self._scale
 
@@ -246,8 +254,9 @@ class ForceMatching:
 
     def _amplitudes(self, joined: FloatArray) -> FloatArray:
         """Of stretches of all runs, whose phases do not count."""
-        ends = np.cumsum([whitener.n_values for whitener in self._whiteners])
-        parts = zip(self._whiteners, np.split(joined, ends[:-1]), strict=True)
+        whiteners = [whitener for shown in self._shown for whitener in shown.whiteners]
+        ends = np.cumsum([whitener.n_values for whitener in whiteners])
+        parts = zip(whiteners, np.split(joined, ends[:-1]), strict=True)
         return np.concatenate([whitener.amplitudes(part) for whitener, part in parts])
 
     def _matches(self, candidate: Candidate, sets: Sequence[Numbers], *, scales: bool) -> list[Match]:
@@ -308,35 +317,103 @@ class ForceMatching:
             if not _is_done(motion):
                 return None
             series.append(motion.tank_force_n)
-        return self._without_linear(self._whitened(series)) / self._scale
+        return np.concatenate([shown.compared(series) for shown in self._shown]) / self._scale
 
-    def _whitened(self, series: Sequence[FloatArray]) -> FloatArray:
-        """Forces of all runs, one after the other."""
-        of_runs = zip(series, self._whiteners, strict=True)
-        return np.concatenate([whitener.whitened(each) for each, whitener in of_runs])
+
+class ShownForces:
+    """Missing forces of some runs as others are compared with them.
+
+    Parameters
+    ----------
+    forces : sequence of LatentForce
+        One per run.
+    moved : sequence of sequences of LatentForce
+        Of every place at which the baseline may be off, one per run.
+
+    Attributes
+    ----------
+    whiteners : list of _Whitener
+        One per run.
+    missing : ndarray
+        Whitened, all runs one after the other, without what a spring, a damper, a mass and a constant force of
+        these places could do that are the same in all runs.
+    is_more_than_noise : bool
+        Whether its squares are more than those of noise besides those of noise.
+    """
+
+    def __init__(self, forces: Sequence[LatentForce], moved: Sequence[Sequence[LatentForce]]) -> None:
+        self.whiteners = [_Whitener(force) for force in forces]
+        of_runs = []
+        for whitener, *places in zip(self.whiteners, *moved, strict=True):
+            motions = [np.concatenate([place.motion_before, place.motion]) for place in places]
+            columns = [*(column for motion in motions for column in motion.T), np.ones(len(motions[0]))]
+            of_runs.append(np.stack([whitener.whitened(column) for column in columns], axis=1))
+        linear = np.concatenate(of_runs)
+        # Both places move alike where the base does not.
+        self._linear = orth(linear / np.maximum(np.abs(linear).max(axis=0), 1e-300))
+        known = zip(forces, self.whiteners, strict=True)
+        self.missing = self._without_linear(
+            np.concatenate([whitener.of_regularised(force.force_n) for force, whitener in known])
+        )
+        noise = sum(whitener.noise for whitener in self.whiteners)
+        self.is_more_than_noise = float(self.missing @ self.missing) > 2.0 * noise
+
+    def compared(self, series: Sequence[FloatArray]) -> FloatArray:
+        """Forces of all runs as the missing ones are.
+
+        Parameters
+        ----------
+        series : sequence of ndarray
+            From the start of each run.
+        """
+        of_runs = zip(series, self.whiteners, strict=True)
+        return self._without_linear(np.concatenate([whitener.whitened(each) for each, whitener in of_runs]))
 
     def _without_linear(self, series: FloatArray) -> FloatArray:
         return np.asarray(series - self._linear @ (self._linear.T @ series))
 
 
-def matchings(forces: Sequence[Sequence[LatentForce]], effort: Effort | None = None) -> dict[str, ForceMatching]:
+@dataclass(frozen=True)
+class Matchings:
+    """Where missing forces of structure and tank are told apart.
+
+    Attributes
+    ----------
+    of : dict of place to ForceMatching
+    power : float
+        Squares of all that is missing, in noise variances.
+    """
+
+    of: dict[str, ForceMatching]
+    power: float
+
+
+def matchings(forces: Sequence[RunForces], effort: Effort | None = None) -> Matchings:
     """Per block, where its missing forces are told apart.
+
+    Where the other block lacks no more than noise, all that both lack is this one's.
 
     Parameters
     ----------
-    forces : sequence of sequences of LatentForce
-        Per run.
+    forces : sequence of RunForces
     effort : Effort, optional
         That of a search.
     """
-    found = {}
-    for place in (STRUCTURE, TANK):
+    at = {
         # A force that may be either's acts along the motion of the structure.
-        places = (place, EITHER) if place == STRUCTURE else (place,)
-        own = [force for of_run in forces for force in of_run if force.place in places]
-        if own:
-            found[place] = ForceMatching(own, effort)
-    return found
+        STRUCTURE: [own for of_run in forces if (own := of_run.at(STRUCTURE) or of_run.at(EITHER))],
+        TANK: [own for of_run in forces if (own := of_run.at(TANK))],
+    }
+    found = {place: ForceMatching(own, effort=effort) for place, own in at.items() if own}
+    lacking = [place for place, each in found.items() if each.is_more_than_noise]
+    undivided = [of_run.undivided for of_run in forces if of_run.undivided is not None]
+    if len(lacking) < 2 and undivided and len(undivided) == len(forces):
+        both = ShownForces(undivided, list(at.values()))
+        if both.is_more_than_noise:
+            own = lacking or list(at)
+            found |= {place: ForceMatching(at[place], both, effort) for place in own}
+            return Matchings(found, max(found[place].power for place in own))
+    return Matchings(found, sum(found[place].power for place in lacking))
 
 
 class _Whitener:

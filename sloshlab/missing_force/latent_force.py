@@ -40,7 +40,7 @@ from sloshlab.twin.terms import Term
 from sloshlab.twin.twin import Twin
 
 FloatArray = NDArray[np.float64]
-Found = tuple[tuple["LatentForce", ...], dict[str, FloatArray]]
+Found = tuple[tuple["LatentForce", ...], "LatentForce | None", dict[str, FloatArray]]
 STRUCTURE, TANK, EITHER = "structure", "tank", "structure or tank"
 
 
@@ -101,6 +101,9 @@ class RunForces:
     carried_mass_kg : float
     probed : ProbedTransfers or None
         Of a twin of a user's own.
+    undivided : LatentForce or None
+        Where a force between structure and tank was measured, what both lack together: the motion tells it at a
+        resonance far better than the measured force divides it.
     """
 
     forces: tuple[LatentForce, ...]
@@ -109,6 +112,7 @@ class RunForces:
     structure: Structure | None
     carried_mass_kg: float
     probed: ProbedTransfers | None = None
+    undivided: LatentForce | None = None
 
     def at(self, place: str) -> LatentForce | None:
         """The force at a place, if it can be told there."""
@@ -156,11 +160,12 @@ def run_forces(
         return _on_probed(model, values, extension, observed, believed, missed)
     simulation = model.whole_simulation(Request(run, values, extension))
     if simulation.twin.structure is None:
-        forces, left = _on_shaker(simulation, run, observed, believed, missed)
+        forces, undivided, left = _on_shaker(simulation, run, observed, believed, missed)
     else:
-        forces, left = _on_structure(simulation, model.rig, observed, believed, missed)
+        forces, undivided, left = _on_structure(simulation, model.rig, observed, believed, missed)
     left |= _cell_disagreements(observed, believed, missed)
-    return RunForces(forces, missed, left, simulation.twin.structure, simulation.twin.carried_mass_kg)
+    structure, carried_mass_kg = simulation.twin.structure, simulation.twin.carried_mass_kg
+    return RunForces(forces, missed, left, structure, carried_mass_kg, undivided=undivided)
 
 
 def channel_responses(
@@ -248,10 +253,10 @@ def _on_structure(
         return LatentForce(run, place, series[kept], error, time[kept], motion[kept], before, share, noise)
 
     measured = _measured(observed, believed, missed)
+    either = latent(EITHER, force - on_structure - in_tank, inverted.noise, relative, inverted.kept_share)
     # Simulation alone tells the sum of both forces only.
     if measured is None:
-        either = latent(EITHER, force - on_structure - in_tank, inverted.noise, relative, inverted.kept_share)
-        return (either,), left
+        return (either,), None, left
     missed_force, force_noise = measured
     inertia = simulation.twin.carried_mass_kg * orders[2]
     # What a wrong release adds to the force between structure and tank is inertia, no missing force of the
@@ -268,9 +273,13 @@ def _on_structure(
     # The remainder, so that both parts add up to the inverted force whatever the regularisation took.
     of_structure = force - in_tank - in_liquid - on_structure
     return (
-        latent(STRUCTURE, of_structure, inverted.noise + kept_share * noise, relative, inverted.kept_share),
-        latent(TANK, in_liquid, kept_share * noise, absolute, kept_share),
-    ), left
+        (
+            latent(STRUCTURE, of_structure, inverted.noise + kept_share * noise, relative, inverted.kept_share),
+            latent(TANK, in_liquid, kept_share * noise, absolute, kept_share),
+        ),
+        either,
+        left,
+    )
 
 
 def _on_probed(
@@ -393,7 +402,7 @@ def _on_shaker(
     left = {motion.channel: missed[motion.channel] - mean for motion in motions}
     measured = _measured(observed, believed, missed)
     if measured is None:
-        return (), left
+        return (), None, left
     missed_force, force_noise = measured
     carried = simulation.twin.carried_mass_kg
     of_noise = np.interp(frequency, *force_noise)
@@ -410,7 +419,8 @@ def _on_shaker(
     time = np.asarray(run.recording["time"].values, np.float64)
     error = float(np.sqrt(sample_variance(share * of_noise, n)))
     before = motion[: kept.start]
-    return (LatentForce(run, TANK, force[kept], error, time[kept], motion[kept], before, share, of_noise),), left
+    lacking = LatentForce(run, TANK, force[kept], error, time[kept], motion[kept], before, share, of_noise)
+    return (lacking,), None, left
 
 
 def _measured(

@@ -97,11 +97,11 @@ class _Matches:
 
     def __init__(self, runs: FittedRuns, places: Places, pool: Sequence[Candidate]) -> None:
         self._places, self._executor = places, runs.model.executor
-        self._matching = matchings(list(places.forces.values()), runs.effort)
+        matching = matchings(list(places.forces.values()), runs.effort)
+        self._matching, self._everything = matching.of, matching.power
         self.candidates = [candidate for candidate in pool if candidate.effect.block in self._matching]
         self.of: dict[str, list[Match]] = {}
         self._population: dict[str, list[Match]] = {}
-        self._everything = sum(each.power for each in self._matching.values() if each.is_more_than_noise)
 
     def found(self, leading: Sequence[Candidate]) -> MatchedForces:
         """All matches as they are now.

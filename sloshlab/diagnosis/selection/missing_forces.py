@@ -12,7 +12,7 @@ from sloshlab.errors import SloshlabError
 from sloshlab.identification.diagnosed_model import DiagnosedModel
 from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.identification.observations import Observation
-from sloshlab.missing_force.latent_force import LatentForce, run_forces
+from sloshlab.missing_force.latent_force import LatentForce, RunForces, run_forces
 from sloshlab.missing_physics.candidate import MissingForces, extension_of
 
 FloatArray = NDArray[np.float64]
@@ -20,7 +20,7 @@ FloatArray = NDArray[np.float64]
 
 def latent_forces(
     model: DiagnosedModel, runs: Sequence[Sequence[Observation]], fit: FreeRunFit
-) -> dict[str, tuple[LatentForce, ...]]:
+) -> dict[str, RunForces]:
     """Latent forces of every run beside a fit; none of runs of which the simulation does not reach its end.
 
     Parameters
@@ -30,24 +30,24 @@ def latent_forces(
         Per run.
     fit : FreeRunFit
     """
-    found: dict[str, tuple[LatentForce, ...]] = {}
+    found: dict[str, RunForces] = {}
     for observed in runs:
         with suppress(SloshlabError):
             extension = extension_of(fit.candidates, fit.values)
-            forces = run_forces(model, observed, fit.values, extension=extension).forces
-            if forces:
+            forces = run_forces(model, observed, fit.values, extension=extension)
+            if forces.forces:
                 found[observed[0].run.name] = forces
     return found
 
 
-def missing_forces(forces: Mapping[str, Sequence[LatentForce]]) -> MissingForces:
+def missing_forces(forces: Mapping[str, RunForces]) -> MissingForces:
     """Of every run the largest of its latent forces, over the whole run.
 
     Parameters
     ----------
-    forces : mapping of run to sequence of LatentForce
+    forces : mapping of run to RunForces
     """
-    return {run: _of_whole_run(max(own, key=lambda force: force.power_n2)) for run, own in forces.items()}
+    return {run: _of_whole_run(max(own.forces, key=lambda force: force.power_n2)) for run, own in forces.items()}
 
 
 def _of_whole_run(force: LatentForce) -> FloatArray:

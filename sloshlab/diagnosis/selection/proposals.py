@@ -16,7 +16,7 @@ from sloshlab.diagnosis.selection.missing_forces import latent_forces, missing_f
 from sloshlab.diagnosis.surroundings import ACROSS_A_BAND, residual_peaks_hz
 from sloshlab.identification.block_jacobian import BlockJacobian
 from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost
-from sloshlab.missing_force.latent_force import LatentForce
+from sloshlab.missing_force.latent_force import RunForces
 from sloshlab.missing_physics.candidate import Candidate, MissingForces
 
 FloatArray = NDArray[np.float64]
@@ -205,7 +205,7 @@ class Places:
     """
 
     missed_hz: tuple[float, ...]
-    forces: dict[str, tuple[LatentForce, ...]]
+    forces: dict[str, RunForces]
     missing: MissingForces
 
     @classmethod

@@ -13,7 +13,15 @@ from scipy.integrate import solve_ivp
 
 from sloshlab.identification.rig_model import RigModel, steps_per_sample
 from sloshlab.missing_force.force_matching import ForceMatching, Match, matchings
-from sloshlab.missing_force.latent_force import EITHER, STRUCTURE, TANK, LatentForce, along, forces_alone
+from sloshlab.missing_force.latent_force import (
+    EITHER,
+    STRUCTURE,
+    TANK,
+    LatentForce,
+    RunForces,
+    along,
+    forces_alone,
+)
 from sloshlab.missing_physics import effects
 from sloshlab.missing_physics.candidate import Candidate
 
@@ -183,12 +191,55 @@ def test_what_is_no_force_of_the_motion_has_no_match(tmp_path: Path) -> None:
     assert matching.ranked(late, late.starts()) == []
 
 
+def of_run(*forces: LatentForce, undivided: LatentForce | None = None) -> RunForces:
+    return RunForces(forces, {}, {}, None, 0.0, undivided=undivided)
+
+
 def test_a_force_of_either_place_is_looked_for_in_the_structure() -> None:
     motion = motion_of(0.003)
-    found = matchings([[latent(np.sin(OMEGA * TIME), motion, "run_1", EITHER)]])
-    assert list(found) == [STRUCTURE]
-    both = [latent(np.sin(OMEGA * TIME), motion, "run_1", place) for place in (STRUCTURE, TANK)]
-    assert set(matchings([both])) == {STRUCTURE, TANK}
+    found = matchings([of_run(latent(np.sin(OMEGA * TIME), motion, "run_1", EITHER))])
+    assert list(found.of) == [STRUCTURE]
+    both = [latent(np.sin(2 * OMEGA * TIME), motion, "run_1", place) for place in (STRUCTURE, TANK)]
+    found = matchings([of_run(*both)])
+    assert set(found.of) == {STRUCTURE, TANK}
+    # what both lack adds up
+    assert found.power == pytest.approx(2 * found.of[TANK].power)
+
+
+@pytest.mark.parametrize("place", [STRUCTURE, TANK])
+def test_a_force_too_small_for_the_measured_one_shows_in_the_motion(tmp_path: Path, place: str) -> None:
+    """Friction of 0.31 N beneath 1 N of noise of the force cells, and 5 mN of what the motion tells."""
+    known = candidate(tmp_path, "structure.coulomb_friction")
+    motion = motion_of(0.003)
+    friction = -0.31 * np.sign(motion[:, 1])
+    spread = np.random.default_rng(3).normal(size=N)
+    parts = {STRUCTURE: -spread, TANK: spread}
+    parts[place] = parts[place] + friction
+    divided = [latent(series, motion, "run_1", at, noise_n=1.0) for at, series in parts.items()]
+    undivided = latent(friction, motion, "run_1", EITHER, noise_n=0.005)
+    alone = matchings([of_run(*divided)])
+    assert alone.power == 0.0
+    assert not alone.of[place].is_more_than_noise
+    found = matchings([of_run(*divided, undivided=undivided)])
+    matching = found.of[place]
+    assert matching.is_more_than_noise
+    assert found.power == max(each.power for each in found.of.values())
+    match = matched(matching, known, starts_of(known))
+    assert match.numbers["structure.coulomb_friction.force_n"] == pytest.approx(0.31, rel=0.01)
+    assert match.misfit < 0.02
+
+
+def test_what_two_places_lack_is_not_taken_for_that_of_one() -> None:
+    """Where both lack more than noise, each is matched to its own share."""
+    motion = motion_of(0.003)
+    tone, other = np.sin(2 * OMEGA * TIME), 0.8 * np.sin(3 * OMEGA * TIME)
+    divided = (latent(tone, motion, "run_1"), latent(other, motion, "run_1", TANK))
+    undivided = latent(tone + other, motion, "run_1", EITHER)
+    found, alone = (matchings([of_run(*divided, undivided=each)]) for each in (undivided, None))
+    assert found.power == alone.power
+    assert {place: each.power for place, each in found.of.items()} == {
+        place: each.power for place, each in alone.of.items()
+    }
 
 
 def test_a_force_within_its_noise_is_told_from_others() -> None:
