@@ -18,7 +18,8 @@ from sloshlab.diagnosis.inference.scored_model import ScoredModel, scored
 from sloshlab.diagnosis.inference.whitened import whitened
 from sloshlab.diagnosis.selection.explained_scatter import ExplainedScatter
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
-from sloshlab.diagnosis.selection.model_selection import N_KEPT, ModelSelection
+from sloshlab.diagnosis.selection.known_fits import N_KEPT
+from sloshlab.diagnosis.selection.model_selection import ModelSelection
 from sloshlab.diagnosis.surroundings import surroundings_of
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.identification.case import Case
@@ -143,10 +144,12 @@ def findings_of(
         retuned_fit, _ = fitted(runs.problem(), retuned_fit.values, stages=INFLATION_STAGES[-1:])
     problem = runs.problem()
     scatter = ExplainedScatter(model, fitting, held_out, case.names_by_test())
-    selection = ModelSelection(runs, surroundings_of(problem, retuned_fit, case.rig), progress, scatter)
+    at = surroundings_of(problem, retuned_fit, case.rig)
+    selection = ModelSelection(runs, at, progress, scatter)
     fits = selection.selected(retuned_fit)
+    known, pool = selection.known, selection.growth.pool
     fitting, held_out = (
-        with_sampled_jumps(model, some, selection.jumping) for some in (scatter.fitting, scatter.held_out)
+        with_sampled_jumps(model, some, known.jumping) for some in (scatter.fitting, scatter.held_out)
     )
     nothing = next(fit for fit in fits if not fit.candidates)
     with_effects = sorted((fit for fit in fits if fit.candidates), key=lambda fit: fit.cost)
@@ -154,21 +157,21 @@ def findings_of(
     score = Scoring(model, fitting, held_out, nothing, case.names_by_test())
     believed, retuned = score.required(believed_fit, "as believed"), score.required(nothing, "retuned")
     # Others are too far behind to have any probability; a few of them say by how much.
-    n_scored = min(max(sum(map(selection.may_win, with_effects)), N_KEPT), _MOST_SCORED)
+    n_scored = min(max(sum(map(known.may_win, with_effects)), N_KEPT), _MOST_SCORED)
     explanations = [found for fit in with_effects[:n_scored] if (found := score.of(fit, retuned)) is not None]
     return Findings(
         case,
         model,
         parts,
-        selection.at,
+        at,
         fitting,
         held_out,
         believed,
         retuned,
         sorted(explanations, key=lambda explanation: -explanation.evidence),
-        posterior([retuned, *explanations], len(selection.pool), names=_names_by_block(selection.pool)),
-        selection.failed,
-        len(selection.pool),
+        posterior([retuned, *explanations], len(pool), names=_names_by_block(pool)),
+        known.failed,
+        len(pool),
     )
 
 

@@ -18,7 +18,7 @@ from sloshlab.diagnosis.findings import Findings, Scoring
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
 from sloshlab.diagnosis.selection.hidden_effects import hidden_effects
-from sloshlab.diagnosis.selection.model_selection import N_KEPT
+from sloshlab.diagnosis.selection.known_fits import N_KEPT
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.diagnosed_model import ModelOfBlocks
 from sloshlab.identification.free_run_fit import fitted

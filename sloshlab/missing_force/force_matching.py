@@ -410,9 +410,9 @@ def matchings(forces: Sequence[RunForces], effort: Effort | None = None) -> Matc
     if len(lacking) < 2 and undivided and len(undivided) == len(forces):
         both = ShownForces(undivided, list(at.values()))
         if both.is_more_than_noise:
-            own = lacking or list(at)
-            found |= {place: ForceMatching(at[place], both, effort) for place in own}
-            return Matchings(found, max(found[place].power for place in own))
+            places = lacking or list(at)
+            found |= {place: ForceMatching(at[place], both, effort) for place in places}
+            return Matchings(found, max(found[place].power for place in places))
     return Matchings(found, sum(found[place].power for place in lacking))
 
 

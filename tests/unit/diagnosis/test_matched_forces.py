@@ -9,8 +9,9 @@ import pytest
 from recorded_oscillators import DAMPING, LIQUID_KG, MASS_KG, RATE_HZ, STIFFNESS, base_motion, rig, run_of
 from scipy.integrate import solve_ivp
 
-from sloshlab.diagnosis.selection import model_selection
+from sloshlab.diagnosis.selection import forward_growth
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
+from sloshlab.diagnosis.selection.full_fit import compensated_fit
 from sloshlab.diagnosis.selection.matched_forces import matched_forces
 from sloshlab.diagnosis.selection.model_selection import ModelSelection
 from sloshlab.diagnosis.surroundings import surroundings_of
@@ -61,21 +62,21 @@ def _search(tmp_path: Path) -> tuple[ModelSelection, FreeRunFit]:
     retuned = fitted_baseline(runs.problem())[0]
     at = surroundings_of(runs.problem(), retuned, case.rig)
     selection = ModelSelection(runs, at, lambda what, done, of: None)
-    selection.pool = [candidate for candidate in candidates(at) if candidate.key in TRIED]
+    selection.growth.pool = [candidate for candidate in candidates(at) if candidate.key in TRIED]
     return selection, retuned
 
 
 def test_a_mass_that_retuning_hides_is_fitted_from_its_force(search: tuple[ModelSelection, FreeRunFit]) -> None:
     selection, retuned = search
-    found = matched_forces(selection.runs, retuned, selection.pool, 3).evolved()
+    found = matched_forces(selection.known.runs, retuned, selection.growth.pool, 3).evolved()
     leading = {candidate.key: (candidate, numbers) for candidate, numbers in found.leading}
     candidate, numbers = leading[CUSHION]
     # as far as what a spring, a damper and a mass could do is set aside
     assert frequency_hz(numbers) == pytest.approx(SLUG_HZ, rel=0.06)
     # Beside the baseline that had taken its place it makes things worse, so that no search by free runs goes on.
-    problem = selection.runs.problem((candidate,))
+    problem = selection.known.runs.problem((candidate,))
     assert problem.costs([{**retuned.values, **numbers}])[0] > retuned.cost
-    fit = selection._compensated(retuned, (candidate, numbers))
+    fit = compensated_fit(selection.known.runs, retuned, candidate, numbers)
     assert fit.cost < 0.5 * retuned.cost
     assert problem.is_down_to_noise(fit)
     assert frequency_hz(fit.values) == pytest.approx(SLUG_HZ, rel=0.002)
@@ -92,7 +93,7 @@ def pools_of_proposals(monkeypatch: pytest.MonkeyPatch) -> list[set[str]]:
         pools.append({candidate.key for candidate in pool})
         return []
 
-    monkeypatch.setattr(model_selection, "proposals", recorded_proposals)
+    monkeypatch.setattr(forward_growth, "proposals", recorded_proposals)
     return pools
 
 
@@ -102,9 +103,9 @@ def test_beside_what_leaves_nothing_come_only_forces_that_do_nearly_the_same(
 ) -> None:
     selection, retuned = search
     pools = pools_of_proposals(monkeypatch)
-    selection._keep([retuned])
-    selection._added([retuned], "one effect", retuned)
-    best = min(selection.fits.values(), key=lambda fit: fit.cost)
+    selection.known.keep([retuned])
+    selection.growth.added([retuned], "one effect", retuned)
+    best = selection.known.best
     assert [candidate.key for candidate in best.candidates] == [CUSHION]
     # The drag leaves nearly all of the slug's force; retuning may have hidden a mass.
     assert pools == [{CUSHION, "tank.mass_error"}]
@@ -115,11 +116,11 @@ def test_in_the_place_of_a_force_come_only_forces_that_do_nearly_the_same(
     search: tuple[ModelSelection, FreeRunFit], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     selection, retuned = search
-    delay = next(each for each in candidates(selection.at) if each.key.startswith("sensor.sensor_delay"))
-    selection.pool = [*selection.pool, delay]
-    selection._keep([retuned])
-    selection._added([retuned], "one effect", retuned)
-    best = selection._best_of(1)
+    delay = next(each for each in candidates(selection.growth.at) if each.key.startswith("sensor.sensor_delay"))
+    selection.growth.pool = [*selection.growth.pool, delay]
+    selection.known.keep([retuned])
+    selection.growth.added([retuned], "one effect", retuned)
+    best = selection.known.best_of(1)
     assert best is not None
     pools = pools_of_proposals(monkeypatch)
     selection._swapped(1)
@@ -133,7 +134,7 @@ def test_without_a_remainder_single_effects_end_the_search(
     """An effect that makes the baseline no more probable starts no further search."""
     selection, retuned = search
     uncovered = []
-    monkeypatch.setattr(selection, "_remains", lambda fit: False)
+    monkeypatch.setattr(selection.known, "remains", lambda fit: False)
     monkeypatch.setattr(selection, "_uncovered", uncovered.append)
     assert selection.selected(retuned) == [retuned]
     assert uncovered == [retuned]

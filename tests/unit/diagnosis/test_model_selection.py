@@ -1,4 +1,4 @@
-"""When the search goes on, and which effects are nested in others."""
+"""Which effects are nested in others, and which starts are begun."""
 
 from __future__ import annotations
 
@@ -9,34 +9,14 @@ from typing import Any, cast
 import pytest
 from recorded_oscillators import decays, effect, rig, surroundings
 
-from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
-from sloshlab.diagnosis.selection.model_selection import ModelSelection, _reduced
+from sloshlab.diagnosis.selection.nested_models import reduced
 from sloshlab.diagnosis.selection.successive_halving import _best_starts
-from sloshlab.identification.effort import Effort
 from sloshlab.identification.free_run_problem import FreeRunFit
-from sloshlab.identification.observations import observations
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_physics import effects
 from sloshlab.missing_physics.candidate import Candidate
 
 assert effects.__all__
-
-
-@pytest.mark.parametrize(
-    ("misfits", "is_little"),
-    [
-        ((3000.0, 2900.0), True),  # a twentieth of the 2000 beyond the noise of 1000 coefficients
-        ((3000.0, 2700.0), False),
-        ((1100.0, 1050.0), False),  # half of the little that is left
-        ((900.0, 899.0), False),  # noise was stated too large: nothing can be said of shares
-    ],
-)
-def test_the_search_ends_where_the_last_effect_explains_little(
-    misfits: tuple[float, float], is_little: bool
-) -> None:
-    fits = [SimpleNamespace(misfit=misfit) for misfit in misfits]
-    search: Any = SimpleNamespace(_best_of=lambda n: fits[n], runs=SimpleNamespace(n_coefficients=1000))
-    assert ModelSelection._explains_little(search, 1) is is_little
 
 
 @pytest.mark.parametrize(
@@ -87,26 +67,4 @@ def test_a_simpler_form_is_fitted_from_the_numbers_of_the_wider_one(tmp_path: Pa
     own = {"structure.asymmetric_friction.force_up_n": 5.0, "structure.asymmetric_friction.force_down_n": 6.0}
     fit = FreeRunFit((wider,), {"frequency of mode 1": 1.01, **own}, 0.0, 0.0)
     assert wider.reduces_to(simpler)
-    assert _reduced(fit, wider, simpler) == {"structure.coulomb_friction.force_n": 5.5}
-
-
-@pytest.mark.parametrize(("n_readings", "is_left"), [(1000, True), (10**9, False)])
-def test_a_search_that_has_simulated_enough_begins_no_more_and_says_so(n_readings: int, is_left: bool) -> None:
-    effort = Effort()
-    effort.add(n_readings)
-    search: Any = SimpleNamespace(runs=SimpleNamespace(effort=effort), failed={})
-    assert ModelSelection._has_budget(search) is is_left
-    assert ("search" in search.failed) is not is_left
-
-
-def test_a_coarse_fit_goes_on_only_where_none_is_known_that_leaves_less(tmp_path: Path) -> None:
-    """In the inflated noise in which the coarse one was fitted."""
-    model = RigModel(rig(tmp_path), tmp_path, decays(duration_s=2.0))
-    runs = FittedRuns(model, [observations(run, model.compared(run)) for run in model.runs], [])
-    worse, better = (
-        FreeRunFit((), {**model.believed, "frequency of mode 1": ratio}, 0.0, 0.0) for ratio in (1.02, 1.0)
-    )
-    for known, coarse, is_known in ((better, worse, True), (worse, better, False)):
-        search: Any = SimpleNamespace(fits={frozenset(): known})
-        assert ModelSelection._is_known(search, runs, coarse, 0.03) is is_known
-    assert not ModelSelection._is_known(cast(Any, SimpleNamespace(fits={})), runs, worse, 0.03)
+    assert reduced(fit, wider, simpler) == {"structure.coulomb_friction.force_n": 5.5}

@@ -229,6 +229,32 @@ def test_a_force_too_small_for_the_measured_one_shows_in_the_motion(tmp_path: Pa
     assert match.misfit < 0.02
 
 
+def test_what_the_baseline_is_off_by_at_either_place_is_set_aside_in_what_both_lack(tmp_path: Path) -> None:
+    """A spring that acts on the structure's motion and a mass on the tank's, a hundred times the friction."""
+    known = candidate(tmp_path, "structure.coulomb_friction")
+    relative, absolute = motion_of(0.003), 3.0 * np.roll(motion_of(0.002), 40, axis=0)
+    friction = -0.31 * np.sign(relative[:, 1])
+    noise = np.random.default_rng(3).normal(size=N)
+    off = 3000.0 * relative[:, 0] + 0.5 * absolute[:, 2]
+    assert np.std(off) > 10 * 0.31
+    divided = [latent(part, relative, "run_1", noise_n=1.0) for part in (friction - noise,)]
+    divided += [latent(noise, absolute, "run_1", TANK, noise_n=1.0)]
+    undivided = latent(friction + off, relative, "run_1", EITHER, noise_n=0.005)
+    match = matched(matchings([of_run(*divided, undivided=undivided)]).of[STRUCTURE], known, starts_of(known))
+    assert match.numbers["structure.coulomb_friction.force_n"] == pytest.approx(0.31, rel=0.02)
+    assert match.misfit < 0.02
+
+
+def test_what_both_lack_is_left_to_the_place_that_lacks_more_than_noise() -> None:
+    motion = motion_of(0.003)
+    tone = np.sin(2 * OMEGA * TIME)
+    noise = 1e-3 * np.random.default_rng(3).normal(size=N)
+    divided = (latent(noise, motion, "run_1"), latent(tone, motion, "run_1", TANK))
+    found = matchings([of_run(*divided, undivided=latent(tone, motion, "run_1", EITHER))])
+    assert not found.of[STRUCTURE].is_more_than_noise
+    assert found.power == found.of[TANK].power
+
+
 def test_what_two_places_lack_is_not_taken_for_that_of_one() -> None:
     """Where both lack more than noise, each is matched to its own share."""
     motion = motion_of(0.003)

@@ -1,0 +1,84 @@
+"""A model fitted to the end, on all runs, from where a search has brought it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
+from sloshlab.identification.free_run_fit import fitted, stages_for
+from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, run_of
+from sloshlab.missing_physics.candidate import Candidate
+
+HopelessCost = Callable[[float], float]
+"""Cost by noise inflation, beyond which a fit is given up."""
+
+
+def at_its_optimum(
+    problem: FreeRunProblem, start: Mapping[str, float], hopeless_cost: HopelessCost | None = None
+) -> FreeRunFit:
+    """A fit through all stages of noise inflation in which the residuals of its start show.
+
+    What stood in for an effect is off by as much when the effect is taken out, and the other way round.
+
+    Parameters
+    ----------
+    problem : FreeRunProblem
+    start : mapping
+    hopeless_cost : callable, optional
+    """
+    here = FreeRunFit(problem.candidates, dict(start), 0.0, 0.0)
+    stages = stages_for(problem, here)
+    return fitted(problem, start, n_iterations=15, stages=stages, hopeless_cost=hopeless_cost)[0]
+
+
+def full_fit(
+    runs: FittedRuns, coarse: FreeRunFit, base: FreeRunFit, hopeless_cost: HopelessCost | None = None
+) -> FreeRunFit:
+    """A fit on all runs, from a coarse one beside a base.
+
+    Parameters
+    ----------
+    runs : FittedRuns
+    coarse, base : FreeRunFit
+        Numbers that the first lacks are those of the second.
+    hopeless_cost : callable, optional
+    """
+    problem = runs.problem_of(coarse)
+    fit = at_its_optimum(problem, {**base.values, **coarse.values}, hopeless_cost)
+    # What an effect has of its own in a run, such as an instant.
+    own = {run_of(name, runs.model) for name in problem.names[problem.n_baseline :]}
+    alone = [run for run in runs.runs if run[0].run.is_free or run[0].run.name in own]
+    if fit.trouble or not alone or problem.is_down_to_noise(fit):
+        return fit
+    # Each of these by itself, from many starts: one that comes to rest elsewhere, or has its pulses at other
+    # instants, holds all other numbers back.
+    values = values_of_runs(runs.model, alone, fit, runs.effort)
+    if not problem.costs([values])[0] < fit.cost:
+        return fit
+    other = at_its_optimum(problem, values, hopeless_cost)
+    return other if other.cost < fit.cost else fit
+
+
+def compensated_fit(
+    runs: FittedRuns,
+    base: FreeRunFit,
+    candidate: Candidate,
+    numbers: Mapping[str, float],
+    hopeless_cost: HopelessCost | None = None,
+) -> FreeRunFit:
+    """A fit from matched numbers, first of all others beside them, which had taken the place of the effect.
+
+    Parameters
+    ----------
+    runs : FittedRuns
+    base : FreeRunFit
+    candidate : Candidate
+        Beyond the effects of the base.
+    numbers : mapping
+        Of the candidate, named as in a fit.
+    hopeless_cost : callable, optional
+    """
+    beside = FreeRunProblem(runs.model, runs.runs, (*base.candidates, candidate), numbers, runs.effort)
+    start = {**base.values, **numbers}
+    held = at_its_optimum(beside, beside.values(beside.theta_of(start)), hopeless_cost)
+    return held if held.trouble else full_fit(runs, held, base, hopeless_cost)

@@ -1,0 +1,67 @@
+"""Models of one search that differ by an effect: what they are called, and one with an effect less or simpler."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from sloshlab.identification.free_run_problem import FreeRunFit
+from sloshlab.missing_physics.candidate import Candidate
+from sloshlab.missing_physics.units import named_and_units
+
+
+def keys_of(candidates: Iterable[Candidate]) -> frozenset[str]:
+    """What tells a model from others: the keys of its effects.
+
+    Parameters
+    ----------
+    candidates : iterable of Candidate
+    """
+    return frozenset(candidate.key for candidate in candidates)
+
+
+def own_numbers(fit: FreeRunFit, effect: Candidate) -> dict[str, float]:
+    """Numbers of one effect of a fit.
+
+    Parameters
+    ----------
+    fit : FreeRunFit
+    effect : Candidate
+    """
+    own = {f"{effect.key}.{parameter.name}" for parameter in effect.effect.parameters}
+    return {name: value for name, value in fit.values.items() if name in own}
+
+
+def without(fit: FreeRunFit, effect: Candidate) -> FreeRunFit:
+    """A fit without one of its effects, at the numbers of the others; its cost is not known.
+
+    Parameters
+    ----------
+    fit : FreeRunFit
+    effect : Candidate
+        The same object as in the fit.
+    """
+    rest = tuple(candidate for candidate in fit.candidates if candidate is not effect)
+    own = own_numbers(fit, effect)
+    return FreeRunFit(rest, {name: value for name, value in fit.values.items() if name not in own}, 0.0, 0.0)
+
+
+def reduced(fit: FreeRunFit, wider: Candidate, simpler: Candidate) -> dict[str, float]:
+    """Numbers of what an effect of a fit reduces to: those of the same name, sizes as they are in mean.
+
+    Parameters
+    ----------
+    fit : FreeRunFit
+    wider, simpler : Candidate
+        The effect of the fit, and another of its place.
+    """
+    own = own_numbers(fit, wider)
+    found = {}
+    for name, start in simpler.starts()[0].items():
+        number = name.removeprefix(f"{simpler.key}.")
+        unit = named_and_units(number)[1]
+        alike = [own[f"{wider.key}.{size}"] for size in wider.sizes if named_and_units(size)[1] == unit]
+        mean = float(np.mean(alike)) if number in simpler.sizes and alike else start
+        found[name] = own.get(f"{wider.key}.{number}", mean)
+    return found

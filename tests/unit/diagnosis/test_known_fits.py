@@ -1,0 +1,73 @@
+"""When a search goes on, by what it has fitted."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from recorded_oscillators import decays, rig
+
+from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
+from sloshlab.diagnosis.selection.known_fits import KnownFits
+from sloshlab.identification.free_run_problem import FreeRunFit
+from sloshlab.identification.observations import observations
+from sloshlab.identification.rig_model import RigModel
+
+
+def runs_of(folder: Path) -> FittedRuns:
+    model = RigModel(rig(folder), folder, decays(duration_s=2.0))
+    return FittedRuns(model, [observations(run, model.compared(run)) for run in model.runs], [])
+
+
+@pytest.mark.parametrize(
+    ("misfits", "is_little"),
+    [
+        ((3000.0, 2900.0), True),  # a twentieth of the 2000 beyond the noise of 1000 coefficients
+        ((3000.0, 2700.0), False),
+        ((1100.0, 1050.0), False),  # half of the little that is left
+        ((900.0, 899.0), False),  # noise was stated too large: nothing can be said of shares
+    ],
+)
+def test_the_search_ends_where_the_last_effect_explains_little(
+    misfits: tuple[float, float], is_little: bool
+) -> None:
+    fits = [SimpleNamespace(misfit=misfit) for misfit in misfits]
+    known: Any = SimpleNamespace(best_of=lambda n: fits[n], runs=SimpleNamespace(n_coefficients=1000))
+    assert KnownFits.explains_little(known, 1) is is_little
+
+
+@pytest.mark.parametrize(("n_readings", "is_left"), [(1000, True), (10**9, False)])
+def test_a_search_that_has_simulated_enough_begins_no_more_and_says_so(
+    tmp_path: Path, n_readings: int, is_left: bool
+) -> None:
+    runs = runs_of(tmp_path)
+    runs.effort.add(n_readings)
+    known = KnownFits(runs)
+    assert known.has_budget() is is_left
+    assert ("search" in known.failed) is not is_left
+
+
+def test_a_coarse_fit_goes_on_only_where_none_is_known_that_leaves_less(tmp_path: Path) -> None:
+    """In the inflated noise in which the coarse one was fitted."""
+    runs = runs_of(tmp_path)
+    worse, better = (
+        FreeRunFit((), {**runs.model.believed, "frequency of mode 1": ratio}, 0.0, 0.0) for ratio in (1.02, 1.0)
+    )
+    for fit, coarse, leaves_less in ((better, worse, True), (worse, better, False)):
+        known = KnownFits(runs)
+        assert not known.leaves_less(runs, coarse, 0.03)
+        known.keep([fit])
+        assert known.leaves_less(runs, coarse, 0.03) is leaves_less
+
+
+def test_of_every_model_the_fit_of_the_lowest_cost_is_kept(tmp_path: Path) -> None:
+    known = KnownFits(runs_of(tmp_path))
+    costs = (3.0, 1.0, 2.0)
+    known.keep([FreeRunFit((), {}, cost, cost) for cost in costs])
+    known.keep([FreeRunFit((), {}, 0.5, 0.5, trouble="does not run")])
+    assert known.best.cost == 1.0
+    assert known.of_length(0) == known.in_order() == [known.best]
+    assert known.best_of(1) is None
+    assert known.failed == {"": "does not run"}
