@@ -7,7 +7,14 @@ from typing import Annotated
 
 import typer
 
-from pipelines.commands.application import Json, OutputFolder, app, command_as_given, finish, free_folder
+from pipelines.commands.application import (
+    GeneralisedForceCache,
+    Json,
+    OutputFolder,
+    app,
+    command_as_given,
+    finish,
+)
 from pipelines.report.result_folder import require_result_folder
 from sloshlab.errors import InputError
 
@@ -57,16 +64,7 @@ def aircraft(
     first: Annotated[float, typer.Option("--from", metavar="U", help="Lowest speed in m/s.")] = 13.0,
     last: Annotated[float, typer.Option("--to", metavar="U", help="Highest speed in m/s.")] = 50.0,
     speeds: Annotated[int, typer.Option("--speeds", help="How many, evenly.")] = 60,
-    cache: Annotated[
-        Path | None,
-        typer.Option(
-            "--cache",
-            metavar="FOLDER",
-            help="Keeps generalised forces of the doublet lattice.",
-            show_default=False,
-            callback=free_folder,
-        ),
-    ] = None,
+    cache: GeneralisedForceCache = None,
     no_report: Annotated[bool, typer.Option("--no-report", help="Write netCDF files only.")] = False,
     as_json: Json = False,
 ) -> None:

@@ -67,6 +67,16 @@ OutputFile = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print a machine-readable summary as the last line.")]
 HalfWidth = Annotated[int, typer.Option("--p", min=1, help="P: a window averages 2P cycles.")]
 Spacing = Annotated[int, typer.Option("--m", min=1, help="M: cycles between the centres of windows.")]
+GeneralisedForceCache = Annotated[
+    Path | None,
+    typer.Option(
+        "--cache",
+        metavar="FOLDER",
+        help="Keeps generalised forces of the doublet lattice.",
+        show_default=False,
+        callback=free_folder,
+    ),
+]
 Redundant = Annotated[
     list[str] | None,
     typer.Option(

@@ -35,8 +35,10 @@ from sloshlab.errors import InputError
 from sloshlab.experiments import experiment_names
 
 if TYPE_CHECKING:
+    from acquisition.virtual_laboratory.numerical_campaign import CampaignSettings
     from pipelines.live_page.live_page import LivePage
     from pipelines.recording.record import RecordSettings
+    from pipelines.recording.virtual import VirtualRun
 
 _VIRTUAL = experiment_names(lambda experiment: bool(experiment.virtual_run))
 """Experiments that the virtual laboratory can run."""
@@ -148,32 +150,17 @@ def virtual(
     as_json: Json = False,
 ) -> None:
     """A run of the virtual laboratory, or repeats and levels of one."""
-    from pipelines.recording.virtual import (
-        CAMPAIGN,
-        VirtualRun,
-        laboratory_seed_of,
-        make_campaign_folder,
-        make_virtual_run,
-    )
-    from pipelines.recording.virtual_repeats import make_repeats, parsed_levels
+    from pipelines.recording.virtual import CAMPAIGN, FLIGHT, VirtualRun, laboratory_seed_of
 
-    if experiment == "flight":
-        from pipelines.recording.virtual_flight import make_flight, make_flight_challenge
-
-        flown = (
-            make_flight(model, output, seed=seed, hide=hide)
-            if cases is None
-            else make_flight_challenge(model, output, truths, n_cases=cases, seed=seed)
-        )
-        finish(flown, as_json)
+    if experiment == FLIGHT:
+        finish(_flown(model, output, seed=seed, hide=hide, n_cases=cases, truths=truths), as_json)
         return
     of_laboratory = laboratory_seed_of(laboratory, laboratory_seed, is_campaign=experiment == CAMPAIGN)
     if experiment == CAMPAIGN:
         from acquisition.virtual_laboratory.numerical_campaign import CampaignSettings
 
-        require_free_folder(output, f"--output {output}")
         computed = CampaignSettings(seed, layers, workers, only, checkpoints, of_laboratory, overwrite)
-        finish(make_campaign_folder(output, liquid, computed, say, scheduler=scheduler), as_json)
+        finish(_campaign_made(output, liquid, computed, scheduler), as_json)
         return
     run = VirtualRun(
         experiment=experiment,
@@ -192,25 +179,62 @@ def virtual(
         second_frequency_hz=second_frequency_hz,
         laboratory_seed=of_laboratory,
     )
-    if repeats > 1 or levels:
-        if checkpoint is not None:
-            raise InputError(
-                "--checkpoint", got="with --repeats or --levels", allowed="one run", remedy="leave it out"
-            )
-        finish(
-            make_repeats(
-                run,
-                rig,
-                output,
-                n_repeats=repeats,
-                levels=parsed_levels(levels) if levels else (),
-                overwrite=overwrite,
-            ),
-            as_json,
+    made = (
+        _repeats_made(
+            run, rig, output, n_repeats=repeats, levels=levels, checkpoint=checkpoint, overwrite=overwrite
         )
-        return
+        if repeats > 1 or levels
+        else _run_made(run, rig, output, checkpoint, overwrite=overwrite)
+    )
+    finish(made, as_json)
+
+
+def _flown(
+    model: Path | None, output: Path, *, seed: int, hide: str, n_cases: int | None, truths: Path | None
+) -> dict[str, Any]:
+    """One flight, or a challenge of so many."""
+    from pipelines.recording.virtual_flight import make_flight, make_flight_challenge
+
+    if n_cases is None:
+        return make_flight(model, output, seed=seed, hide=hide)
+    return make_flight_challenge(model, output, truths, n_cases=n_cases, seed=seed)
+
+
+def _campaign_made(folder: Path, liquid: str, settings: CampaignSettings, scheduler: str | None) -> dict[str, Any]:
+    from pipelines.recording.virtual import make_campaign_folder
+
+    require_free_folder(folder, f"--output {folder}")
+    return make_campaign_folder(folder, liquid, settings, say, scheduler=scheduler)
+
+
+def _repeats_made(
+    run: VirtualRun,
+    rig: Path | None,
+    folder: Path,
+    *,
+    n_repeats: int,
+    levels: str,
+    checkpoint: Path | None,
+    overwrite: bool,
+) -> dict[str, Any]:
+    """Repeats and levels of a run."""
+    from pipelines.recording.virtual_repeats import make_repeats, parsed_levels
+
+    if checkpoint is not None:
+        raise InputError(
+            "--checkpoint", got="with --repeats or --levels", allowed="one run", remedy="leave it out"
+        )
+    chosen = parsed_levels(levels) if levels else ()
+    return make_repeats(run, rig, folder, n_repeats=n_repeats, levels=chosen, overwrite=overwrite)
+
+
+def _run_made(
+    run: VirtualRun, rig: Path | None, output: Path, checkpoint: Path | None, *, overwrite: bool
+) -> dict[str, Any]:
+    from pipelines.recording.virtual import make_virtual_run
+
     require_free_place(output, overwrite=overwrite, described="--output")
-    finish(make_virtual_run(run, rig, output, checkpoint, overwrite=overwrite), as_json)
+    return make_virtual_run(run, rig, output, checkpoint, overwrite=overwrite)
 
 
 @app.command()

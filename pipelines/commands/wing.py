@@ -7,7 +7,14 @@ from typing import Annotated
 
 import typer
 
-from pipelines.commands.application import Json, OutputFolder, app, command_as_given, finish, free_folder
+from pipelines.commands.application import (
+    GeneralisedForceCache,
+    Json,
+    OutputFolder,
+    app,
+    command_as_given,
+    finish,
+)
 from pipelines.report.result_folder import require_result_folder
 
 
@@ -49,16 +56,7 @@ def wing(
         float | None,
         typer.Option("--gust-length", metavar="M", help="25 semi-chords unless stated.", show_default=False),
     ] = None,
-    cache: Annotated[
-        Path | None,
-        typer.Option(
-            "--cache",
-            metavar="FOLDER",
-            help="Keeps generalised forces of the doublet lattice.",
-            show_default=False,
-            callback=free_folder,
-        ),
-    ] = None,
+    cache: GeneralisedForceCache = None,
     no_report: Annotated[bool, typer.Option("--no-report", help="Write data only.")] = False,
     as_json: Json = False,
 ) -> None:

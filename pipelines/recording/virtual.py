@@ -41,6 +41,8 @@ LABORATORIES: Final = ("exact", "drawn")
 LIQUIDS: Final = ("law", "numerical", "two_phase")
 CAMPAIGN: Final = "campaign"
 """In place of an experiment: a whole folder of raw_data."""
+FLIGHT: Final = "flight"
+"""In place of an experiment: a case of a wing in flight."""
 
 
 def virtual_experiments() -> tuple[str, ...]:

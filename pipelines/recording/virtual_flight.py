@@ -19,8 +19,6 @@ from pipelines.report.progress import progress
 from sloshlab import atomic_file
 from sloshlab.errors import InputError
 
-FLIGHT: Final = "flight"
-"""In place of an experiment: a case of a wing in flight."""
 MOST_CASES: Final = 1000
 _OF_THE_WING: Final = tuple(
     each.name for each in dataclasses.fields(HiddenFlight) if isinstance(each.default, float)
