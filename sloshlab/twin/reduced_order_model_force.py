@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import astuple, fields
+from dataclasses import fields
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
@@ -19,27 +19,24 @@ import numpy.typing as npt
 
 from sloshlab.errors import InputError
 from sloshlab.reduced_order_model.break_up import BreakUp
-from sloshlab.reduced_order_model.free_run import kind_of
-from sloshlab.reduced_order_model.model import ReducedOrderModel
-from sloshlab.reduced_order_model.networks.multilayer import Multilayer
-from sloshlab.reduced_order_model.networks.network import LARGEST_PARAMETERS, Network
-from sloshlab.reduced_order_model.regressors import MOST_DELAYS
-from sloshlab.reduced_order_model.stepping import require_no_slow_states
-from sloshlab.reduced_order_model.storage import load_model
-from sloshlab.reduced_order_model.tank_scaling import HYPOTHESES, TankScaling, model_for_tank
-from sloshlab.reduced_order_model.validity_domain import ValidityDomain
-from sloshlab.rig import Rig
-from sloshlab.twin.reduced_order_model_law import (
+from sloshlab.reduced_order_model.compiled_step import (
     N_HEADER,
     N_VALUES,
     NETWORK_NUMBERS,
     RADIAL,
     TANH,
-    force_between_instants,
-    runaway,
-    step_of_model,
+    step_table,
     workspace_size,
 )
+from sloshlab.reduced_order_model.model import ReducedOrderModel
+from sloshlab.reduced_order_model.networks.network import LARGEST_PARAMETERS
+from sloshlab.reduced_order_model.regressors import MOST_DELAYS
+from sloshlab.reduced_order_model.stepping import require_steppable
+from sloshlab.reduced_order_model.storage import load_model
+from sloshlab.reduced_order_model.tank_scaling import HYPOTHESES, TankScaling, model_for_tank
+from sloshlab.reduced_order_model.validity_domain import ValidityDomain
+from sloshlab.rig import Rig
+from sloshlab.twin.reduced_order_model_law import force_between_instants, runaway, step_of_model
 from sloshlab.twin.terms import ForceKind, Parameter, Term, register
 
 FloatArray = npt.NDArray[np.float64]
@@ -159,18 +156,10 @@ def term_of(model: ReducedOrderModel, rig: Rig) -> Term:
     InputError
         If the model sees the present input, does not tell its tank, or was trained at other fill levels.
     """
-    require_no_slow_states(model)
-    # the force would have to wait for the motion that it makes
-    if min(model.delays.inputs) < 1:
-        raise InputError(
-            "rom: input delays",
-            got=", ".join(str(delay) for delay in sorted(model.delays.inputs)[:3]) + " …",
-            allowed="1 and more",
-            remedy="the force on the tank cannot wait for the motion it makes; train without the present input",
-        )
+    require_steppable(model)
     scaled, factors = model_for_tank(model, rig)
     return REDUCED_ORDER_MODEL(
-        table=_table(scaled),
+        table=step_table(scaled, _domain_numbers(scaled.facts)),
         sampling_rate_hz=scaled.sampling_rate_hz,
         input_offset_m_per_s=scaled.scaling.input_offset,
         input_scale_m_per_s=scaled.scaling.input_scale,
@@ -180,24 +169,6 @@ def term_of(model: ReducedOrderModel, rig: Rig) -> Term:
         height_ratio=factors.velocity**2,
         liquid_mass_ratio=factors.force,
     )
-
-
-def _table(model: ReducedOrderModel) -> FloatArray:
-    network, layers = _network(model.network)
-    domain, delays = _domain_numbers(model.facts), model.delays
-    break_up = () if model.break_up is None else astuple(model.break_up)
-    sizes = [len(delays.inputs), len(delays.outputs), len(layers), model.theta.size, len(break_up), domain.size]
-    of_network = [[*delays.inputs, *delays.outputs], layers, model.theta]
-    parts = [[network, *sizes], *of_network, break_up, domain, model.constant_regressors]
-    numbers = np.concatenate([np.asarray(part, np.float64) for part in parts])
-    # its own length first: the law finds the workspace behind the table by it
-    return np.concatenate([[numbers.size + 1.0], numbers])
-
-
-def _network(network: Network) -> tuple[int, tuple[int, ...]]:
-    if isinstance(network, Multilayer):
-        return (TANH if network.activation == "tanh" else RADIAL), network.layers
-    return kind_of(network), (int(network.settings()["n_neurons"]),)
 
 
 def _domain_numbers(facts: Mapping[str, Any]) -> FloatArray:
