@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
 import os
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -13,15 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from acquisition.virtual_laboratory.liquid_force import LiquidForce
-from acquisition.virtual_laboratory.sensors import (
-    ACCELEROMETERS,
-    FORCE_CELLS,
-    LOST_COUNT,
-    Laboratory,
-    Reading,
-    cell_forces,
-    reading,
-)
+from acquisition.virtual_laboratory.sensors import LOST_COUNT, Laboratory
 from acquisition.virtual_laboratory.shaker import (
     STROKE_LIMIT_M,
     Imperfections,
@@ -31,11 +21,12 @@ from acquisition.virtual_laboratory.shaker import (
     SweepPlan,
     shaken,
 )
+from acquisition.virtual_laboratory.shaker_channels import readings_of, recording_of
 from acquisition.virtual_laboratory.tone_motion import Accelerated, TankMotion, random_motion, two_tone_motion
 from sloshlab.configurations import CONFIGURATIONS, EMPTY, FROZEN
 from sloshlab.errors import InputError
 from sloshlab.experiments import EXPERIMENTS, experiment_names
-from sloshlab.recording import CLIPPED, LOST, STUCK, quality_attributes, write_recording
+from sloshlab.recording import write_recording
 from sloshlab.rig import Rig
 
 if TYPE_CHECKING:  # its compiled loops take a second to load; a liquid that follows its law needs none of them
@@ -182,14 +173,8 @@ def virtual_shaker_run(
     >>> run.sizes["time"], run.attrs["experiment"]
     (2560, 'shaker_sweep')
     """
-    _check_choice("experiment", experiment, experiment_names(lambda known: known.moves == "shaker"))
-    _check_choice("configuration", configuration, CONFIGURATIONS)
-    _check_choice("direction", direction, ("up", "down"))
-    _check_choice("law", law, SWEEP_LAWS)
-    if seed < 0:
-        raise InputError("seed", got=str(seed), allowed="≥ 0")
-    if not 0 <= n_clipped <= 1000:
-        raise InputError("n_clipped", got=str(n_clipped), allowed="0 … 1000")
+    _check_choices(experiment, configuration, direction, law)
+    _check_numbers(seed, n_clipped)
     if experiment in TONES and numerical is None:
         raise InputError("experiment", got=experiment, remedy="its liquid has no law; take a computed one")
     # one frequency only; the attributes of the recording tell it by equal ends of the sweep
@@ -207,25 +192,22 @@ def virtual_shaker_run(
     )
     time_s = _sample_times(duration_s, sampling_rate_hz, max(start_hz, stop_hz))
     flags = _lost_samples(time_s, lost)
-    laboratory = laboratory or Laboratory.perfect()
+    truth = laboratory or Laboratory.perfect()
     if numerical is None:
         shaker = virtual_shaker(
-            rig, plan, configuration=configuration, seed=seed, imperfect=imperfect, laboratory=laboratory
+            rig, plan, configuration=configuration, seed=seed, imperfect=imperfect, laboratory=truth
         )
-        along, method = shaker.motion.at(time_s), dict[str, Any]()
-        external_force_n = shaker.external_force_n(time_s, along)
-        moved: Accelerated = along
+        run = _run_by_law(shaker, time_s)
     else:
         motion = _numerical_motion(experiment, plan, seed, imperfect)
         liquid_force_n, method = numerical.force_n(
             rig, motion, configuration, sampling_rate_hz=sampling_rate_hz, seed=seed
         )
-        # a computation that became unstable gives the samples that are valid
-        time_s, flags = time_s[: liquid_force_n.size], flags[: liquid_force_n.size]
-        moved = motion.at(time_s)
-        external_force_n = rig.tank.dry_mass_kg * laboratory.dry_mass_factor * moved.acceleration - liquid_force_n
-    readings = _readings(
-        external_force_n, moved, time_s, laboratory, seed=seed, noisy=imperfect, n_clipped=n_clipped
+        dry_mass_kg = rig.tank.dry_mass_kg * truth.dry_mass_factor
+        run = _computed_run(motion, time_s, liquid_force_n, dry_mass_kg, method)
+        flags = flags[: run.time_s.size]
+    readings = readings_of(
+        run.external_force_n, run.motion, run.time_s, truth, seed=seed, noisy=imperfect, n_clipped=n_clipped
     )
     for its_reading in readings.values():
         its_reading.counts[flags] = LOST_COUNT
@@ -240,9 +222,51 @@ def virtual_shaker_run(
         "acceleration_g": float(acceleration_g),
         "repeat": int(repeat),
         **_plan_attributes(plan, experiment),
-        **method,
+        **run.method,
     }
-    return _dataset(time_s, readings, flags, attributes)
+    return recording_of(run.time_s, readings, flags, attributes)
+
+
+@dataclass(frozen=True)
+class _Run:
+    """Motion of the tank and force on it, at the samples."""
+
+    time_s: FloatArray
+    motion: Accelerated
+    external_force_n: FloatArray
+    method: dict[str, Any]
+
+
+def _run_by_law(shaker: VirtualShaker, time_s: FloatArray) -> _Run:
+    motion = shaker.motion.at(time_s)
+    return _Run(time_s, motion, shaker.external_force_n(time_s, motion), {})
+
+
+def _computed_run(
+    motion: TankMotion, time_s: FloatArray, liquid_force_n: FloatArray, dry_mass_kg: float, method: dict[str, Any]
+) -> _Run:
+    # a computation that became unstable gives the samples that are valid
+    valid_s = time_s[: liquid_force_n.size]
+    moved = motion.at(valid_s)
+    return _Run(valid_s, moved, dry_mass_kg * moved.acceleration - liquid_force_n, method)
+
+
+def _check_choices(experiment: str, configuration: str, direction: str, law: str) -> None:
+    for what, got, allowed in (
+        ("experiment", experiment, experiment_names(lambda known: known.moves == "shaker")),
+        ("configuration", configuration, CONFIGURATIONS),
+        ("direction", direction, ("up", "down")),
+        ("law", law, SWEEP_LAWS),
+    ):
+        if got not in allowed:
+            raise InputError(what, got=repr(got), allowed=", ".join(allowed))
+
+
+def _check_numbers(seed: int, n_clipped: int) -> None:
+    if seed < 0:
+        raise InputError("seed", got=str(seed), allowed="≥ 0")
+    if not 0 <= n_clipped <= 1000:
+        raise InputError("n_clipped", got=str(n_clipped), allowed="0 … 1000")
 
 
 def write_virtual_run(run: xr.Dataset, path: str | os.PathLike[str]) -> None:
@@ -270,11 +294,6 @@ def write_virtual_run(run: xr.Dataset, path: str | os.PathLike[str]) -> None:
     if "quality" in run:
         encoding["quality"]["_FillValue"] = None
     write_recording(run, path, encoding=encoding)
-
-
-def _check_choice(what: str, got: str, allowed: tuple[str, ...]) -> None:
-    if got not in allowed:
-        raise InputError(what, got=repr(got), allowed=", ".join(allowed))
 
 
 def _numerical_motion(experiment: str, plan: SweepPlan, seed: int, imperfect: bool) -> TankMotion:
@@ -322,35 +341,6 @@ def _sample_times(duration_s: float, sampling_rate_hz: float, highest_hz: float)
     return np.arange(n_samples) / sampling_rate_hz
 
 
-def _readings(
-    external_force_n: FloatArray,
-    moved: Accelerated,
-    time_s: FloatArray,
-    laboratory: Laboratory,
-    *,
-    seed: int,
-    noisy: bool,
-    n_clipped: int,
-) -> dict[str, Reading]:
-    forces = cell_forces(external_force_n, time_s, laboratory)
-    truths = dict(zip(FORCE_CELLS, forces, strict=True))
-    truths.update(dict.fromkeys(ACCELEROMETERS, moved.acceleration))
-    # one after the other in the order of the channels: the recordings of raw_data, made again, are the same bytes
-    generator = np.random.default_rng([seed, 2])
-    return {
-        name: reading(
-            truth,
-            quantity=name.partition("_")[0],
-            gain=laboratory.gain[name],
-            offset_share=laboratory.offset_share[name],
-            generator=generator,
-            noisy=noisy,
-            n_clipped=n_clipped if name == FORCE_CELLS[0] else 0,
-        )
-        for name, truth in truths.items()
-    }
-
-
 def _lost_samples(time_s: FloatArray, lost: tuple[float, int] | None) -> NDArray[np.bool_]:
     flags = np.zeros(time_s.size, dtype=bool)
     if lost is not None:
@@ -361,47 +351,3 @@ def _lost_samples(time_s: FloatArray, lost: tuple[float, int] | None) -> NDArray
         start = int(np.searchsorted(time_s, lost[0]))
         flags[start : start + int(lost[1])] = True
     return flags
-
-
-def _dataset(
-    time_s: FloatArray,
-    readings: Mapping[str, Reading],
-    lost_samples: NDArray[np.bool_],
-    attributes: Mapping[str, Any],
-) -> xr.Dataset:
-    variables: dict[str, xr.Variable] = {}
-    flags = np.where(lost_samples, np.uint8(LOST), np.uint8(0)).astype(np.uint8)
-    for name, its_reading in readings.items():
-        variables[name] = xr.Variable(
-            ("time",),
-            its_reading.values,
-            _channel_attributes(name, its_reading),
-            {"scale_factor": its_reading.step},
-        )
-        flags[its_reading.clipped] |= CLIPPED
-    if flags.any():
-        variables["quality"] = xr.Variable(("time",), flags, _legend())
-    return xr.Dataset(variables, coords={"time": ("time", time_s, {"units": "s"})}, attrs=dict(attributes))
-
-
-def _legend() -> dict[str, Any]:
-    """What the bits of `quality` mean."""
-    legend = quality_attributes()
-    # the recordings in raw_data do not name the flag of stuck sensors; made again, they must be the same bytes
-    is_named = legend["flag_masks"] != STUCK
-    meanings = itertools.compress(legend["flag_meanings"].split(), is_named)
-    return {"flag_masks": legend["flag_masks"][is_named], "flag_meanings": " ".join(meanings)}
-
-
-def _channel_attributes(name: str, its_reading: Reading) -> dict[str, Any]:
-    quantity = name.partition("_")[0]
-    attributes: dict[str, Any] = {
-        "units": {"force": "N", "acceleration": "m s-2"}[quantity],
-        "quantity": quantity,
-        "range_min": -its_reading.half_scale,
-        "range_max": its_reading.half_scale,
-        "noise_std": its_reading.noise_std,
-    }
-    if quantity == "force":
-        attributes.update(block_from="shaker", block_to="tank")
-    return attributes
