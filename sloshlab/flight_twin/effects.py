@@ -26,7 +26,15 @@ def flight_effects(n_tanks: int) -> tuple[Effect, ...]:
     n_tanks : int
     """
     tanks = tuple(tank_name(i) for i in range(n_tanks))
-    return (*_of_air(), *_of_excitation(), *_of_control(), *_of_structure(), *_of_tanks(tanks))
+    return (
+        *_of_air(),
+        *_of_excitation(),
+        *_of_control(),
+        *_of_structure(),
+        *_of_vertical_sloshing(tanks),
+        *_of_fill(tanks),
+        *_of_lateral_sloshing(tanks),
+    )
 
 
 def _ratio(name: str, low: float, high: float, least: float, most: float) -> EffectParameter:
@@ -65,6 +73,29 @@ def _effect(
     return Effect(
         name, block, equation, tuple(parameters), lambda at: [dict(start) for start in starts], extension,
         separated_by, variant_of=variant_of, reduces_to=reduces_to, size=size, corrects=corrects,
+    )  # fmt: skip
+
+
+def _tank_effect(
+    tanks: tuple[str, ...],
+    name: str,
+    equation: str,
+    parameters: Sequence[EffectParameter],
+    starts: Sequence[Numbers],
+    numbers: Mapping[str, str],
+    separated_by: str,
+    size: tuple[str, ...] = (),
+) -> Effect:
+    """An effect in one of the tanks; `numbers` says which number of the tank each parameter is."""
+
+    def extension(given: Numbers, at: Surroundings, channel: str) -> Extension:
+        del at
+        tank = tanks.index(channel)
+        return Extension(numbers={of_tank(numbers[key], tank): value for key, value in given.items()})
+
+    return Effect(
+        name, "tank", equation, tuple(parameters), lambda at: [dict(start) for start in starts], extension,
+        separated_by, places=lambda at: tanks, size=size,
     )  # fmt: skip
 
 
@@ -231,28 +262,10 @@ def _of_structure() -> tuple[Effect, ...]:
     )
 
 
-def _of_tanks(tanks: tuple[str, ...]) -> tuple[Effect, ...]:
-    def effect(
-        name: str,
-        equation: str,
-        parameters: Sequence[EffectParameter],
-        starts: Sequence[Numbers],
-        meant: Mapping[str, str],
-        separated_by: str,
-        size: tuple[str, ...] = (),
-    ) -> Effect:
-        def extension(given: Numbers, at: Surroundings, channel: str) -> Extension:
-            del at
-            tank = tanks.index(channel)
-            return Extension(numbers={of_tank(meant[key], tank): value for key, value in given.items()})
-
-        return Effect(
-            name, "tank", equation, tuple(parameters), lambda at: [dict(start) for start in starts], extension,
-            separated_by, places=lambda at: tanks, size=size,
-        )  # fmt: skip
-
+def _of_vertical_sloshing(tanks: tuple[str, ...]) -> tuple[Effect, ...]:
     return (
-        effect(
+        _tank_effect(
+            tanks,
             "liquid_sloshing",
             "Δf = −W̄ m_l ω/π G u̇, G = aⁿ/(aⁿ + a_tⁿ) of the acceleration's envelope a",
             [
@@ -265,7 +278,8 @@ def _of_tanks(tanks: tuple[str, ...]) -> tuple[Effect, ...]:
             _TWO_LEVELS,
             ("peak_w_bar",),
         ),
-        effect(
+        _tank_effect(
+            tanks,
             "effective_mass",
             "Δf = −β m_l ü",
             [_ratio("beta", -1.0, 3.0, 0.01, 0.9)],
@@ -273,7 +287,13 @@ def _of_tanks(tanks: tuple[str, ...]) -> tuple[Effect, ...]:
             {"beta": "added_mass"},
             _TWO_FILLS,
         ),
-        effect(
+    )
+
+
+def _of_fill(tanks: tuple[str, ...]) -> tuple[Effect, ...]:
+    return (
+        _tank_effect(
+            tanks,
             "fuel_state",
             "another fill: m_l and its inertia",
             [_place("fill_level", 0.02, 0.98, 0.1, 0.95)],
@@ -281,7 +301,8 @@ def _of_tanks(tanks: tuple[str, ...]) -> tuple[Effect, ...]:
             {"fill_level": "fill_level"},
             f"two modes in a ground vibration test; {_TWO_FILLS}",
         ),
-        effect(
+        _tank_effect(
+            tanks,
             "liquid_loss",
             "m_l falls with time in every run",
             [EffectParameter("rate_kg_per_s", 0.0, 1.0, range=Range(5e-4, 0.1))],
@@ -289,7 +310,13 @@ def _of_tanks(tanks: tuple[str, ...]) -> tuple[Effect, ...]:
             {"rate_kg_per_s": "loss_kg_per_s"},
             "a longer run",
         ),
-        effect(
+    )
+
+
+def _of_lateral_sloshing(tanks: tuple[str, ...]) -> tuple[Effect, ...]:
+    return (
+        _tank_effect(
+            tanks,
             "lateral_mode",
             "linear sloshing along the chord, driven by pitch",
             [
