@@ -104,28 +104,62 @@ def _until_next_knot(t, spacing_s):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _settle(y, trial, out, system):  # type: ignore[no-untyped-def]
+    """Rates at the start; what is let go outside a margin has left it at once."""
+    evaluate(0.0, y, trial.slopes[0], trial.seen, system)
+    for _ in range(at.N_CONDITIONS):
+        margins(y, trial.seen, system.conditions, system.p, out)
+        which = _first_left(out)
+        if which < 0:
+            break
+        switch(which, y, trial.seen, system.conditions, system.p)
+        evaluate(0.0, y, trial.slopes[0], trial.seen, system)
+
+
+@njit(cache=True)
+def _step_to_switch(t, y, length, which, whole, part, out, system):  # type: ignore[no-untyped-def]
+    """Halve a step over a switch until it ends there; returns its length and the condition that is left."""
+    early, late = 0.0, length
+    for _ in range(100):
+        if late - early < _SHORTEST:
+            break
+        middle = 0.5 * (early + late)
+        _step(t, y, middle, part, system)
+        margins(part.end, part.seen, system.conditions, system.p, out)
+        which_middle = _first_left(out)
+        if which_middle >= 0:
+            late, which = middle, which_middle
+        else:
+            early = middle
+    _step(t, y, late, whole, system)
+    return late, which
+
+
+@njit(cache=True)
+def _take_switch(t, y, which, trial, system, events, n_events):  # type: ignore[no-untyped-def]
+    """Change a condition, note it where there is room, and begin anew with its rates."""
+    conditions = system.conditions
+    switch(which, y, trial.seen, conditions, system.p)
+    evaluate(t, y, trial.slopes[0], trial.seen, system)
+    if n_events < events.shape[0]:
+        events[n_events, 0], events[n_events, 1], events[n_events, 2] = t, which, conditions[which]
+
+
+@njit(cache=True)
 def integrate(y, sampling, system, record):  # type: ignore[no-untyped-def]
     """Advance `y` sample by sample and fill the record.
 
     Returns the number of events, or a negative number where the integration fails.
     """
     n_samples, step, relative = sampling
-    seen_all, events = record.seen, record.events
     p, conditions, n = system.p, system.conditions, system.psi.size
     slopes, end, scale = np.zeros((7, y.size)), np.empty(y.size), np.abs(y)
     _grow(scale, y, n)
-    seen, out, shifted = np.empty(at.N_OUTPUTS + 4), np.empty(at.N_CONDITIONS), np.empty(y.size)
-    whole, part = Trial(slopes, end, seen), Trial(slopes, shifted, seen)
+    seen, out = np.empty(at.N_OUTPUTS + 4), np.empty(at.N_CONDITIONS)
+    whole, part = Trial(slopes, end, seen), Trial(slopes, np.empty(y.size), seen)
     n_events, t, h = 0, 0.0, 0.2 * step
-    evaluate(t, y, slopes[0], seen, system)
-    for _ in range(at.N_CONDITIONS):  # what is let go outside a margin has left it at once
-        margins(y, seen, conditions, p, out)
-        which = _first_left(out)
-        if which < 0:
-            break
-        switch(which, y, seen, conditions, p)
-        evaluate(t, y, slopes[0], seen, system)
-    _note(seen_all[0], seen, slopes[0], n)
+    _settle(y, whole, out, system)
+    _note(record.seen[0], seen, slopes[0], n)
     for sample in range(1, n_samples):
         end_s = sample * step
         stops_at_knots = False
@@ -145,34 +179,13 @@ def integrate(y, sampling, system, record):  # type: ignore[no-untyped-def]
             margins(end, seen, conditions, p, out)
             which = _first_left(out)
             if which >= 0:
-                early, late = 0.0, now
-                for _ in range(100):
-                    if late - early < _SHORTEST:
-                        break
-                    middle = 0.5 * (early + late)
-                    _step(t, y, middle, part, system)
-                    margins(shifted, seen, conditions, p, out)
-                    which_middle = _first_left(out)
-                    if which_middle >= 0:
-                        late, which = middle, which_middle
-                        end[:] = shifted
-                    else:
-                        early = middle
-                now = late
-                _step(t, y, now, whole, system)
+                now, which = _step_to_switch(t, y, now, which, whole, part, out, system)
             y[:] = end
             t += now
             _grow(scale, y, n)
             slopes[0] = slopes[6]
             if which >= 0:
-                switch(which, y, seen, conditions, p)
-                evaluate(t, y, slopes[0], seen, system)
-                if n_events < events.shape[0]:
-                    events[n_events, 0], events[n_events, 1], events[n_events, 2] = (
-                        t,
-                        which,
-                        conditions[which],
-                    )
+                _take_switch(t, y, which, whole, system, record.events, n_events)
                 n_events += 1
                 if n_events > _MOST_EVENTS:
                     return -2
@@ -180,7 +193,7 @@ def integrate(y, sampling, system, record):  # type: ignore[no-untyped-def]
             else:
                 # what a sample or a knot cut short says nothing against the step before it
                 h = max(h if now < h else 0.0, now * min(4.0, 0.9 * max(error, 1e-4) ** -0.2))
-        _note(seen_all[sample], seen, slopes[0], n)
+        _note(record.seen[sample], seen, slopes[0], n)
     return n_events
 
 

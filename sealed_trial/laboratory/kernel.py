@@ -28,76 +28,94 @@ EQUAL_FORCES = 1e-9
 
 
 @njit(cache=True)
+def _friction_of_driven(sliding, p):  # type: ignore[no-untyped-def]
+    """Friction on a tank whose motion is given."""
+    if sliding == 0.0:
+        return 0.0
+    direction = 1 if sliding > 0 else -1
+    return -direction * friction_limit(direction, sliding, p)
+
+
+@njit(cache=True)
+def _coordinate_rates(y, rates, at_tank, forces, moved, system):  # type: ignore[no-untyped-def]
+    """Rates of the coordinates; `at_tank` is relative velocity, sliding velocity and the acceleration of the base.
+
+    Returns friction, the force that would hold the slider, the acceleration of the tank and the power lost.
+    """
+    inverse_mass, damping, stiffness, gamma, psi, p, _, _, _, conditions = system
+    n = psi.size
+    (v, sliding, base_acceleration), (on_structure, on_tank) = at_tank, forces
+    slides_at_tank = p[at.FRICTION_AT_TANK]
+    direct, accelerations, answer = np.empty(n), np.empty(n), np.empty(n)
+    freely = mobility = friction = 0.0
+    place = on_structure + on_tank - moved * base_acceleration
+    for j in range(n):
+        total = -gamma[j] * base_acceleration + psi[j] * place
+        for k in range(n):
+            total -= damping[j, k] * y[n + k] + stiffness[j, k] * y[k]
+        direct[j] = total
+    for j in range(n):
+        accelerations[j] = answer[j] = 0.0
+        for k in range(n):
+            accelerations[j] += inverse_mass[j, k] * direct[k]
+            answer[j] += inverse_mass[j, k] * psi[k]
+        freely += psi[j] * accelerations[j]
+        mobility += psi[j] * answer[j]
+    heavier = 1.0 + moved * mobility
+    hold = (-slides_at_tank * base_acceleration * heavier - freely) / mobility
+    side = conditions[at.D_FRICTION]
+    if p[at.FRICTION_UP] != 0.0 or p[at.FRICTION_DOWN] != 0.0:
+        friction = hold if side == 0 else -side * friction_limit(side, sliding, p)
+    correction = friction - moved * (freely + friction * mobility) / heavier
+    tank_acceleration = base_acceleration + freely + correction * mobility
+    loss = 0.0
+    for j in range(n):
+        rates[j] = y[n + j]
+        rates[n + j] = accelerations[j] + correction * answer[j]
+        for k in range(n):
+            loss += y[n + j] * damping[j, k] * y[n + k]
+    place_acceleration = tank_acceleration - base_acceleration
+    loss -= v * (on_structure + on_tank + friction - moved * (place_acceleration + base_acceleration))
+    return friction, hold, tank_acceleration, loss
+
+
+@njit(cache=True)
 def evaluate(t, y, rates, seen, system):  # type: ignore[no-untyped-def]
     """Rates dy/dt and what is seen (outputs, then hold force, upper and lower limit, sliding velocity)."""
-    inverse_mass, damping, stiffness, gamma, psi, p, bank, step, table, conditions = system
-    n = psi.size
+    psi, p, conditions, n = system.psi, system.p, system.conditions, system.psi.size
     state = y[2 * n :]
     base = np.empty(4)
-    base_motion(t, step, table, base)
+    base_motion(t, system.step, system.table, base)
     x = v = 0.0
     for j in range(n):
         x += psi[j] * y[j]
         v += psi[j] * y[n + j]
-    tank = np.empty(2)
-    tank[0] = base[1] + v
-    at_tank = p[at.FRICTION_AT_TANK]
+    velocity = base[1] + v
+    slides_at_tank = p[at.FRICTION_AT_TANK]
     extra = tank_extra_mass(t, state, p)
-    moved = extra + p[at.STRUCTURE_MASS]
     on_structure = structure_force(t, (x, v), state, p, conditions)
-    on_tank = tank_force(tank[0], state, p, conditions, base[3])
+    on_tank = tank_force(velocity, state, p, conditions, base[3])
     outside = outside_force(t, p)
     if p[at.OUTSIDE_AT_TANK] != 0.0:
         on_tank += outside
     else:
         on_structure += outside
-    sliding = v + at_tank * base[1]
-    friction = hold = 0.0
+    sliding = v + slides_at_tank * base[1]
     if n == 0:
-        if sliding != 0.0:
-            direction = 1 if sliding > 0 else -1
-            friction = -direction * friction_limit(direction, sliding, p)
-        tank[1] = base[2]
+        friction, hold, acceleration, loss = _friction_of_driven(sliding, p), 0.0, base[2], 0.0
     else:
-        direct, accelerations, answer = np.empty(n), np.empty(n), np.empty(n)
-        freely = mobility = 0.0
-        place = on_structure + on_tank - moved * base[2]
-        for j in range(n):
-            total = -gamma[j] * base[2] + psi[j] * place
-            for k in range(n):
-                total -= damping[j, k] * y[n + k] + stiffness[j, k] * y[k]
-            direct[j] = total
-        for j in range(n):
-            accelerations[j] = answer[j] = 0.0
-            for k in range(n):
-                accelerations[j] += inverse_mass[j, k] * direct[k]
-                answer[j] += inverse_mass[j, k] * psi[k]
-            freely += psi[j] * accelerations[j]
-            mobility += psi[j] * answer[j]
-        heavier = 1.0 + moved * mobility
-        hold = (-at_tank * base[2] * heavier - freely) / mobility
-        side = conditions[at.D_FRICTION]
-        if p[at.FRICTION_UP] != 0.0 or p[at.FRICTION_DOWN] != 0.0:
-            friction = hold if side == 0 else -side * friction_limit(side, sliding, p)
-        correction = friction - moved * (freely + friction * mobility) / heavier
-        tank[1] = base[2] + freely + correction * mobility
-        loss = 0.0
-        for j in range(n):
-            rates[j] = y[n + j]
-            rates[n + j] = accelerations[j] + correction * answer[j]
-            for k in range(n):
-                loss += y[n + j] * damping[j, k] * y[n + k]
-        place_acceleration = tank[1] - base[2]
-        loss -= v * (on_structure + on_tank + friction - moved * (place_acceleration + base[2]))
-    state_rates(rates[2 * n :], state, (v, tank[0], tank[1]), p, conditions)
+        friction, hold, acceleration, loss = _coordinate_rates(
+            y, rates, (v, sliding, base[2]), (on_structure, on_tank), extra + p[at.STRUCTURE_MASS], system
+        )
+    state_rates(rates[2 * n :], state, (v, velocity, acceleration), p, conditions)
     if p[at.RELAXATION_GAIN] != 0.0:
-        relaxation_rates(rates[2 * n :], state, v, bank)
+        relaxation_rates(rates[2 * n :], state, v, system.bank)
     if n > 0:
         rates[2 * n + at.S_DISSIPATED] = loss
     seen[at.O_DISPLACEMENT] = base[0] + x
-    seen[at.O_ACCELERATION] = tank[1]
-    seen[at.O_LIQUID_FORCE] = on_tank - extra * tank[1] + at_tank * friction
-    seen[at.O_INTERFACE_FORCE] = p[at.CARRIED_MASS] * tank[1] - seen[at.O_LIQUID_FORCE]
+    seen[at.O_ACCELERATION] = acceleration
+    seen[at.O_LIQUID_FORCE] = on_tank - extra * acceleration + slides_at_tank * friction
+    seen[at.O_INTERFACE_FORCE] = p[at.CARRIED_MASS] * acceleration - seen[at.O_LIQUID_FORCE]
     seen[at.O_RELATIVE_DISPLACEMENT] = x
     seen[at.O_RELATIVE_VELOCITY] = v
     seen[at.N_OUTPUTS] = hold
