@@ -8,7 +8,14 @@ samples · ``time_axis`` the uniform time · ``validation`` what every recording
 and ``decoding`` from a file · ``writing`` to one.
 """
 
-from sloshlab.recording.attributes import FORMAT, ChannelAttributes, RunAttributes, run_attributes
+from sloshlab.recording.attributes import (
+    FORMAT,
+    ChannelAttributes,
+    Configuration,
+    RecordedExperiment,
+    RunAttributes,
+    run_attributes,
+)
 from sloshlab.recording.channel_access import channels, with_values
 from sloshlab.recording.decoding import MAXIMUM_DECODED_BYTES
 from sloshlab.recording.quality_bits import CLIPPED, CRC_REPAIRED, LOST, OUT_OF_ORDER, STUCK, quality_attributes
@@ -27,6 +34,8 @@ __all__ = [
     "OUT_OF_ORDER",
     "STUCK",
     "ChannelAttributes",
+    "Configuration",
+    "RecordedExperiment",
     "RunAttributes",
     "channels",
     "largest_jitter",
