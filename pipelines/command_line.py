@@ -46,7 +46,7 @@ _PLACES: Final = {
     "benchmark": "field_benchmarks",
     "trial": "trial",
     "campaign": "campaign",
-    "virtual": "laboratory",
+    "virtual": "virtual",
     "record": "laboratory",
     "recover": "laboratory",
     "replay": "laboratory",
