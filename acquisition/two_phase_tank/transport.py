@@ -69,14 +69,12 @@ def _volumes_z(state, work, dt, k_):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _carry_x(state, work, k_):  # type: ignore[no-untyped-def]
-    """Momenta, then liquid, carried along x by the volumes of `_volumes_x`."""
-    u, w, c = state.u, state.w, state.c
-    nx, nz = c.shape
-    vx, fx, lx, rho, centre = work.vx, work.fx, work.lx, work.rho, work.centre
-    un, wn = work.uv, work.wv
+def _carry_u_along_x(state, work, k_):  # type: ignore[no-untyped-def]
+    """New u into `work.uv`: its fluxes go through the centres of cells."""
+    u, un, (nx, nz) = state.u, work.uv, state.c.shape
+    vx, fx, rho, centre = work.vx, work.fx, work.rho, work.centre
     jump = k_.rho_l - k_.rho_g
-    # the flux of u through the centre of a cell is kept in us[i], that of w through the corner in ws
+    # that through the centre of a cell is kept in us[i]
     flux = work.us
     for i in range(nx):
         left, right = max(i - 1, 0), min(i + 2, nx)
@@ -97,6 +95,14 @@ def _carry_x(state, work, k_):  # type: ignore[no-untyped-def]
             mass = 0.5 * (rho[i - 1, k] + rho[i, k])
             after = mass - 0.5 * (fx[i + 1, k] - fx[i - 1, k]) + gain
             un[i, k] = ((mass + gain) * u[i, k] - flux[i, k] + flux[i - 1, k]) / after
+
+
+@njit(cache=True, error_model="numpy")
+def _carry_w_along_x(state, work, k_):  # type: ignore[no-untyped-def]
+    """New w into `work.wv`: its fluxes go through the corners of cells."""
+    w, wn, (nx, nz) = state.w, work.wv, state.c.shape
+    vx, fx, rho, centre = work.vx, work.fx, work.rho, work.centre
+    jump = k_.rho_l - k_.rho_g
     flux = work.us
     for i in range(1, nx):
         far_left, far_right = max(i - 2, 0), min(i + 1, nx - 1)
@@ -121,12 +127,28 @@ def _carry_x(state, work, k_):  # type: ignore[no-untyped-def]
             mass = 0.5 * (rho[i, k - 1] + rho[i, k])
             out = 0.5 * (fx[i + 1, k - 1] + fx[i + 1, k] - fx[i, k - 1] - fx[i, k])
             wn[i, k] = ((mass + gain) * w[i, k] - flux[i + 1, k] + flux[i, k]) / (mass - out + gain)
+
+
+@njit(cache=True, error_model="numpy")
+def _take_over(state, work):  # type: ignore[no-untyped-def]
+    """The carried velocities as those of the state, inside the walls."""
+    u, w, (nx, nz) = state.u, state.w, state.c.shape
     for i in range(1, nx):
         for k in range(nz):
-            u[i, k] = un[i, k]
+            u[i, k] = work.uv[i, k]
     for i in range(nx):
         for k in range(1, nz):
-            w[i, k] = wn[i, k]
+            w[i, k] = work.wv[i, k]
+
+
+@njit(cache=True, error_model="numpy")
+def _carry_x(state, work, k_):  # type: ignore[no-untyped-def]
+    """Momenta, then liquid, carried along x by the volumes of `_volumes_x`."""
+    _carry_u_along_x(state, work, k_)
+    _carry_w_along_x(state, work, k_)
+    _take_over(state, work)
+    c, vx, lx, centre = state.c, work.vx, work.lx, work.centre
+    nx, nz = c.shape
     for i in range(nx):
         for k in range(nz):
             gain = centre[i, k] * (vx[i + 1, k] - vx[i, k])
@@ -134,12 +156,10 @@ def _carry_x(state, work, k_):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _carry_z(state, work, k_):  # type: ignore[no-untyped-def]
-    """Momenta, then liquid, carried along z by the volumes of `_volumes_z`."""
-    u, w, c = state.u, state.w, state.c
-    nx, nz = c.shape
-    vz, fz, lz, rho, centre = work.vz, work.fz, work.lz, work.rho, work.centre
-    un, wn = work.uv, work.wv
+def _carry_w_along_z(state, work, k_):  # type: ignore[no-untyped-def]
+    """New w into `work.wv`: its fluxes go through the centres of cells."""
+    w, wn, (nx, nz) = state.w, work.wv, state.c.shape
+    vz, fz, rho, centre = work.vz, work.fz, work.rho, work.centre
     jump = k_.rho_l - k_.rho_g
     flux = work.ws
     for i in range(nx):
@@ -162,6 +182,15 @@ def _carry_z(state, work, k_):  # type: ignore[no-untyped-def]
             mass = 0.5 * (rho[i, k - 1] + rho[i, k])
             after = mass - 0.5 * (fz[i, k + 1] - fz[i, k - 1]) + gain
             wn[i, k] = ((mass + gain) * w[i, k] - flux[i, k] + flux[i, k - 1]) / after
+
+
+@njit(cache=True, error_model="numpy")
+def _carry_u_along_z(state, work, k_):  # type: ignore[no-untyped-def]
+    """New u into `work.uv`: its fluxes go through the corners of cells."""
+    u, un, (nx, nz) = state.u, work.uv, state.c.shape
+    vz, fz, rho, centre = work.vz, work.fz, work.rho, work.centre
+    jump = k_.rho_l - k_.rho_g
+    flux = work.ws
     for i in range(1, nx):
         flux[i, 0] = flux[i, nz] = 0.0
         for k in range(1, nz):
@@ -182,12 +211,16 @@ def _carry_z(state, work, k_):  # type: ignore[no-untyped-def]
             mass = 0.5 * (rho[i - 1, k] + rho[i, k])
             out = 0.5 * (fz[i - 1, k + 1] + fz[i, k + 1] - fz[i - 1, k] - fz[i, k])
             un[i, k] = ((mass + gain) * u[i, k] - flux[i, k + 1] + flux[i, k]) / (mass - out + gain)
-    for i in range(1, nx):
-        for k in range(nz):
-            u[i, k] = un[i, k]
-    for i in range(nx):
-        for k in range(1, nz):
-            w[i, k] = wn[i, k]
+
+
+@njit(cache=True, error_model="numpy")
+def _carry_z(state, work, k_):  # type: ignore[no-untyped-def]
+    """Momenta, then liquid, carried along z by the volumes of `_volumes_z`."""
+    _carry_w_along_z(state, work, k_)
+    _carry_u_along_z(state, work, k_)
+    _take_over(state, work)
+    c, vz, lz, centre = state.c, work.vz, work.lz, work.centre
+    nx, nz = c.shape
     for i in range(nx):
         for k in range(nz):
             gain = centre[i, k] * (vz[i, k + 1] - vz[i, k])
