@@ -24,7 +24,8 @@ from sloshlab.twin.twin import Twin
 from sloshlab.units import SI_UNITS
 from sloshlab.user_twin.description import Compared, EquationTwin, FreeTwin, Parameter, TwinRun, UserTwin
 from sloshlab.user_twin.extended import save_extended
-from sloshlab.user_twin.simulators import Asked, Truth, or_why_not, simulator_of
+from sloshlab.user_twin.simulator import Asked, Truth, or_why_not
+from sloshlab.user_twin.simulators import simulator_of
 
 FloatArray = NDArray[np.float64]
 _MOST_KEPT: Final = 400
