@@ -22,7 +22,7 @@ from acquisition.devices.laboratory_time import LaboratoryTime
 from acquisition.devices.truth import Truth
 from acquisition.devices.uart import TransmitQueue
 from acquisition.devices.wire import Wire
-from acquisition.files.can_database import write_dbc
+from acquisition.files.can_database_text import write_dbc
 from acquisition.samples.channel import Channel
 from acquisition.sources.interface import SourceURL
 from acquisition.sources.multicast_loopback import DEFAULT_GROUP, open_multicast_bus

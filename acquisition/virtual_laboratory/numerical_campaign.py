@@ -7,33 +7,30 @@ checkpoints. The bytes of a recording depend on its run, the seed and the resolu
 from __future__ import annotations
 
 import contextlib
-import fnmatch
-import hashlib
-import json
-import math
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import xarray as xr
 
 from acquisition.numerical_tank import checkpoint as checkpoints
 from acquisition.numerical_tank.instability import STOPPED
-from acquisition.numerical_tank.tank import TankSetup
 from acquisition.two_phase_tank import checkpoint as two_phase_checkpoint
-from acquisition.two_phase_tank.setup import TwoPhaseSetup
 from acquisition.virtual_laboratory.campaign import (
-    CAMPAIGN_LABORATORY,
-    MANIFEST_NAME,
     campaign_laboratory,
-    file_record,
-    laboratory_option,
 )
-from acquisition.virtual_laboratory.numerical_liquid import NumericalLiquid, numerical_setup, two_phase_setup
+from acquisition.virtual_laboratory.numerical_campaign_manifest import Manifest
+from acquisition.virtual_laboratory.numerical_campaign_tasks import (
+    CampaignSettings,
+    CampaignTask,
+    campaign_tasks,
+    cost_of,
+)
+from acquisition.virtual_laboratory.numerical_liquid import NumericalLiquid
 from acquisition.virtual_laboratory.numerical_runs import RIG_TEXTS, NumericalRun, numerical_runs
 from acquisition.virtual_laboratory.shaker_run import START_TIME_UTC, virtual_shaker_run, write_virtual_run
 from acquisition.virtual_laboratory.structure_rig import structure_laboratory
@@ -44,54 +41,8 @@ from campaigns.store import only_one
 from campaigns.task import Ending, Task
 from campaigns.working import work_through
 from sloshlab import atomic_file
-from sloshlab._version import __version__
-from sloshlab.errors import InputError, RecordingInterruptedError, SloshlabError
-from sloshlab.recording import read_attributes
+from sloshlab.errors import InputError, RecordingInterruptedError
 from sloshlab.rig import Rig
-
-CHECKPOINTS_NAME: Final = ".checkpoints"
-COMMAND: Final = "sloshlab virtual campaign --liquid {} -o raw_data/{} --layers {} --seed {}"
-_SAMPLING_RATE_HZ: Final = 512.0
-_FIRST_SEED: Final = 500
-"""Other seeds than those of the campaign whose liquid follows a law."""
-# of a quarter filled at h/16 four layers would be left; six of h/24 are as many as of 3/8 at h/16
-_SHALLOWEST_FILL: Final = 0.375  # a shallower liquid is computed more finely
-
-
-@dataclass(frozen=True)
-class CampaignSettings:
-    """How a campaign is made.
-
-    Attributes
-    ----------
-    seed : int
-        Of noise, motion and liquid.
-    layers_per_height : int
-        Resolution: height of the tank over the distance of the particles, or over the side of a cell; half as fine
-        again at α = 0.25.
-    n_workers : int
-        Processes.
-    only : str
-        Pattern of the names of the runs to be made, as of files.
-    checkpoints : path-like, optional
-        Folder of the checkpoints; by default one within the campaign's.
-    laboratory_seed : int, optional
-        Of the laboratory that serves all runs; None for one that is as the rigs tell.
-    overwrite : bool
-        Whether recordings may be replaced that the manifest does not name.
-    with_gas : bool
-        Whether liquid and gas are computed on a grid; else the liquid alone as particles. Only the runs on the
-        shaker are then made: a structure carries particles.
-    """
-
-    seed: int = 0
-    layers_per_height: int = 16
-    n_workers: int = 2
-    only: str = "*"
-    checkpoints: str | os.PathLike[str] | None = None
-    laboratory_seed: int | None = CAMPAIGN_LABORATORY
-    overwrite: bool = False
-    with_gas: bool = False
 
 
 @dataclass(frozen=True)
@@ -135,17 +86,6 @@ class CampaignSummary:
     flags: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class _Task:
-    run: NumericalRun
-    recording: Path
-    checkpoint: Path
-    seed: int
-    layers_per_height: int
-    laboratory_seed: int | None
-    with_gas: bool
-
-
 def make_numerical_campaign(
     folder: str | os.PathLike[str],
     settings: CampaignSettings | None = None,
@@ -180,16 +120,16 @@ def make_numerical_campaign(
     """
     settings = settings or CampaignSettings()
     target = Path(folder)
-    tasks = _tasks(target, settings, numerical_runs() if runs is None else runs)
+    tasks = campaign_tasks(target, settings, numerical_runs() if runs is None else runs)
     with _alone(tasks[0].checkpoint.parent):
-        manifest = _Manifest(target, settings)
+        manifest = Manifest(target, settings)
         if not settings.overwrite:
             manifest.require_own(tasks)
         for name, text in RIG_TEXTS.items():
             atomic_file.write_bytes(target / name, text.encode())
         missing = [task for task in tasks if not manifest.vouches_for(task)]
         # the longest first, or one process would work at it alone at the end
-        missing.sort(key=_cost, reverse=True)
+        missing.sort(key=cost_of, reverse=True)
         session = _Session(manifest, missing, progressed or (lambda share: None), finished or (lambda run: None))
         try:
             # a process each: what one run leaves behind in it cannot touch another
@@ -207,7 +147,7 @@ def make_numerical_campaign(
     return CampaignSummary(manifest.path, len(tasks) - len(missing), session.n_made, tuple(session.flags))
 
 
-def _as_task(task: _Task) -> Task:
+def _as_task(task: CampaignTask) -> Task:
     arguments = {
         "run": {**asdict(task.run), "settings": dict(task.run.settings)},
         "recording": str(task.recording.absolute()),
@@ -234,7 +174,7 @@ def record_told_run(arguments: Mapping[str, Any], say_share: Callable[[float], N
     dict
         ``computing_s`` and ``flag``.
     """
-    task = _Task(
+    task = CampaignTask(
         NumericalRun(**arguments["run"]),
         Path(arguments["recording"]),
         Path(arguments["checkpoint"]),
@@ -246,7 +186,7 @@ def record_told_run(arguments: Mapping[str, Any], say_share: Callable[[float], N
     return record(task, say_share)
 
 
-def record(task: _Task, progress: Callable[[float], None]) -> dict[str, Any]:
+def record(task: CampaignTask, progress: Callable[[float], None]) -> dict[str, Any]:
     """Make one recording.
 
     Returns
@@ -271,7 +211,7 @@ def record(task: _Task, progress: Callable[[float], None]) -> dict[str, Any]:
     return {"computing_s": computing_s, "flag": str(recording.attrs.get(STOPPED, ""))}
 
 
-def _discard_if_damaged(task: _Task) -> None:
+def _discard_if_damaged(task: CampaignTask) -> None:
     """A run whose checkpoint cannot be read starts again; the campaign goes on."""
     checkpoint = task.checkpoint
     if checkpoint.exists():
@@ -282,7 +222,7 @@ def _discard_if_damaged(task: _Task) -> None:
             checkpoint.unlink()
 
 
-def _recording(task: _Task, liquid: NumericalLiquid) -> xr.Dataset:
+def _recording(task: CampaignTask, liquid: NumericalLiquid) -> xr.Dataset:
     run = task.run
     start = datetime.fromisoformat(START_TIME_UTC) + timedelta(minutes=10 * run.number)
     common: dict[str, Any] = {
@@ -304,13 +244,18 @@ class _Session:
 
     def __init__(
         self,
-        manifest: _Manifest,
-        tasks: Sequence[_Task],
+        manifest: Manifest,
+        tasks: Sequence[CampaignTask],
         progressed: Callable[[float], None],
         finished: Callable[[FinishedRun], None],
     ) -> None:
-        self._manifest, self._tasks, self._progressed, self._finished = manifest, tasks, progressed, finished
-        self._costs = [_cost(task) for task in tasks]
+        self._manifest, self._tasks, self._progressed, self._finished = (
+            manifest,
+            tasks,
+            progressed,
+            finished,
+        )
+        self._costs = [cost_of(task) for task in tasks]
         self._shares = [0.0] * len(tasks)
         self.n_done, self.n_made, self.flags = 0, 0, list[str]()
 
@@ -332,162 +277,6 @@ class _Session:
         self._finished(
             FinishedRun(task.run.name, result["computing_s"], self.n_done, len(self._tasks), result["flag"])
         )
-
-
-class _Manifest:
-    """`manifest.json`: what each file is, and what it was made of."""
-
-    def __init__(self, folder: Path, settings: CampaignSettings) -> None:
-        self.path, self._folder, self._settings = folder / MANIFEST_NAME, folder, settings
-        self._runs: dict[str, Any] = {}
-        self._files: dict[str, Any] = {}
-        # a manifest that is not there, or none, vouches for nothing
-        with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
-            known = json.loads(self.path.read_text(encoding="utf-8"))
-            self._runs, self._files = dict(known["runs"]), dict(known["files"])
-
-    def vouches_for(self, task: _Task) -> bool:
-        """Whether the recording is there, unchanged, and made as it would be made now."""
-        run = self._runs.get(task.run.name)
-        if not isinstance(run, dict) or run.get("made_of") != _made_of(task) or not task.recording.is_file():
-            return False
-        # by its content: a recording may have been replaced or cut since
-        return bool(self._files.get(self._relative(task.recording)) == file_record(task.recording))
-
-    def require_own(self, tasks: Sequence[_Task]) -> None:
-        """Refuse to replace files of no campaign; a recording that was damaged since is made again.
-
-        Raises
-        ------
-        InputError
-        """
-        rigs = {self._folder / name: text.encode() for name, text in RIG_TEXTS.items()}
-        others = [path for path, text in rigs.items() if path.exists() and path.read_bytes() != text]
-        # a campaign that was killed leaves recordings that its manifest does not name yet
-        others += [t.recording for t in tasks if os.path.lexists(t.recording) and not _is_of(t)]
-        for path in others:
-            if self._relative(path) not in self._files:
-                raise InputError(
-                    f"recording {path}",
-                    got="a file that no campaign wrote",
-                    remedy="another folder, or --overwrite",
-                )
-
-    def add(self, task: _Task, result: Mapping[str, Any]) -> None:
-        self._files[self._relative(task.recording)] = file_record(task.recording)
-        self._runs[task.run.name] = {
-            "seed": task.seed,
-            "settings": dict(task.run.settings),
-            "rig": task.run.rig,
-            **({"layers_per_height": task.layers_per_height} if task.run.is_computed else {}),
-            "made_of": _made_of(task),
-            "computing_s": round(result["computing_s"], 1),
-            **({"flag": result["flag"]} if result["flag"] else {}),
-        }
-        self.write()
-
-    def write(self) -> None:
-        self._files.update({name: file_record(self._folder / name) for name in RIG_TEXTS})
-        content = {
-            "format": 1,
-            "command": _command(self._settings),
-            "seed": self._settings.seed,
-            "layers_per_height": self._settings.layers_per_height,
-            "sloshlab_version": __version__,
-            "runs": self._runs,
-            "files": self._files,
-        }
-        atomic_file.write_bytes(self.path, (json.dumps(content, indent=1, sort_keys=True) + "\n").encode())
-
-    def _relative(self, path: Path) -> str:
-        return path.relative_to(self._folder).as_posix()
-
-
-def _command(settings: CampaignSettings) -> str:
-    """The command that makes the same campaign."""
-    names = ("two_phase", "two_phase_tank") if settings.with_gas else ("numerical", "numerical_tank")
-    made = COMMAND.format(*names, settings.layers_per_height, settings.seed)
-    return made + laboratory_option(settings.laboratory_seed)
-
-
-def _is_of(task: _Task) -> bool:
-    """Whether the recording of a task says of itself that it is one."""
-    try:
-        attributes = read_attributes(task.recording)
-    except SloshlabError:
-        return False
-    more = attributes.model_extra or {}
-    return attributes.run_id == Path(task.run.name).name and "liquid" in more and more.get("seed") == task.seed
-
-
-def _tasks(folder: Path, settings: CampaignSettings, runs: Sequence[NumericalRun]) -> list[_Task]:
-    for name, number in (("seed", settings.seed), ("laboratory seed", settings.laboratory_seed or 0)):
-        if number < 0:
-            raise InputError(f"{name} of the campaign", got=str(number), allowed="≥ 0")
-    chosen = [run for run in runs if fnmatch.fnmatchcase(run.name, settings.only)]
-    if settings.with_gas:
-        chosen = [run for run in chosen if run.is_on_shaker]
-    if not chosen:
-        names = ", ".join(run.name for run in runs[:2])
-        raise InputError("--only", got=repr(settings.only), allowed=f"a pattern of names such as {names}")
-    return [_task(folder, settings, run) for run in chosen]
-
-
-def _task(folder: Path, settings: CampaignSettings, run: NumericalRun) -> _Task:
-    """What a worker is told; what cannot be computed is refused here, before hours are spent on others."""
-    task = _Task(
-        run,
-        folder / f"{run.name}.nc",
-        Path(),
-        1000 * settings.seed + _FIRST_SEED + run.number,
-        _layers_per_height(settings, run),
-        settings.laboratory_seed,
-        settings.with_gas,
-    )
-    kept_in = Path(settings.checkpoints or folder / CHECKPOINTS_NAME)
-    # the hash in the name, so that a checkpoint of other settings is not taken up, nor lost
-    checkpoint = kept_in / f"{run.name.replace('/', '_')}_{_made_of(task)[:12]}.checkpoint"
-    return replace(task, checkpoint=checkpoint)
-
-
-def _layers_per_height(settings: CampaignSettings, run: NumericalRun) -> int:
-    """A shallow liquid is computed more finely, so that it is as many particles deep as one that fills 3/8."""
-    fill_level = Rig.from_toml_text(RIG_TEXTS[run.rig]).liquid.fill_level
-    return max(settings.layers_per_height, math.ceil(_SHALLOWEST_FILL * settings.layers_per_height / fill_level))
-
-
-def _setup(task: _Task) -> TankSetup | TwoPhaseSetup | None:
-    """The computed tank of a run; None where no liquid moves."""
-    if not task.run.is_computed:
-        return None
-    rig = Rig.from_toml_text(RIG_TEXTS[task.run.rig])
-    common: dict[str, Any] = {"seed": task.seed, "sampling_rate_hz": _SAMPLING_RATE_HZ}
-    if task.with_gas:
-        return two_phase_setup(rig, cells_per_height=task.layers_per_height, **common)
-    return numerical_setup(rig, layers_per_height=task.layers_per_height, **common)
-
-
-def _cost(task: _Task) -> float:
-    """Steps of particles or cells, about proportional to the time of computing."""
-    setup, duration_s = _setup(task), float(task.run.settings["duration_s"])
-    if setup is None:
-        return duration_s * 1e4
-    n = setup.n_along * setup.n_up if isinstance(setup, TwoPhaseSetup) else setup.n_particles
-    return duration_s * n / setup.step_s
-
-
-def _made_of(task: _Task) -> str:
-    """Hash of all that a recording follows from."""
-    setup = _setup(task)
-    content = {
-        "rig": RIG_TEXTS[task.run.rig],
-        "run": asdict(task.run),
-        "seeds": [task.seed, task.laboratory_seed],
-        "tank": None if setup is None else asdict(setup),
-        # another version may compute another liquid: its recordings are made again
-        "version": __version__,
-    }
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 @contextlib.contextmanager

@@ -1,7 +1,7 @@
 """What the frames of a CAN device look like: which bits are counter, clock, checksum and channels.
 
-`device_database` lays out the frames of a device of ours, `acquisition.files.can_database` writes a layout
-as a DBC file and takes one from any. ``docs/can_protocol.md`` has the convention.
+`device_database` lays out the frames of a device of ours, `acquisition.files.can_database_text` writes a layout
+as a DBC file, `acquisition.files.can_database` takes one from any. ``docs/can_protocol.md`` has the convention.
 """
 
 from __future__ import annotations

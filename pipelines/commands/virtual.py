@@ -23,7 +23,7 @@ from sloshlab.errors import InputError
 from sloshlab.experiments import experiment_names
 
 if TYPE_CHECKING:
-    from acquisition.virtual_laboratory.numerical_campaign import CampaignSettings
+    from acquisition.virtual_laboratory.numerical_campaign_tasks import CampaignSettings
     from pipelines.recording.virtual import VirtualRun
 
 _VIRTUAL = experiment_names(lambda experiment: bool(experiment.virtual_run))
@@ -143,7 +143,7 @@ def virtual(
         return
     of_laboratory = laboratory_seed_of(laboratory, laboratory_seed, is_campaign=experiment == CAMPAIGN)
     if experiment == CAMPAIGN:
-        from acquisition.virtual_laboratory.numerical_campaign import CampaignSettings
+        from acquisition.virtual_laboratory.numerical_campaign_tasks import CampaignSettings
 
         computed = CampaignSettings(seed, layers, workers, only, checkpoints, of_laboratory, overwrite)
         finish(_campaign_made(output, liquid, computed, scheduler), as_json)

@@ -32,7 +32,8 @@ from sloshlab.registry import loaded
 from sloshlab.rig import Rig
 
 if TYPE_CHECKING:  # the compiled loops of a computed liquid take a second to load: only where it is computed
-    from acquisition.virtual_laboratory.numerical_campaign import CampaignSettings, FinishedRun
+    from acquisition.virtual_laboratory.numerical_campaign import FinishedRun
+    from acquisition.virtual_laboratory.numerical_campaign_tasks import CampaignSettings
     from acquisition.virtual_laboratory.numerical_liquid import NumericalLiquid
 
 DEVIATIONS: Final = "laboratory_deviations"

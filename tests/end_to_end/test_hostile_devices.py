@@ -20,7 +20,7 @@ import pytest
 from live_commands import Command, running, visible, wait_until
 from short_runs import DONE_BUT_FLAGGED, INPUT_IS_BAD, assert_one_line
 
-from acquisition.files.can_database import dbc_text
+from acquisition.files.can_database_text import dbc_text
 from acquisition.samples.channel import Channel
 from acquisition.wire.can_layout import device_database
 from sloshlab.recording import read_recording

@@ -19,7 +19,8 @@ sys.path.insert(0, str(TESTS / "unit" / "acquisition" / "files"))
 import import_scenarios  # noqa: E402
 
 from acquisition.files import describe_source, import_recording  # noqa: E402
-from acquisition.files.can_database import dbc_text, read_layout  # noqa: E402
+from acquisition.files.can_database import read_layout  # noqa: E402
+from acquisition.files.can_database_text import dbc_text  # noqa: E402
 from acquisition.files.channel_map import SourceSection, read_channel_map  # noqa: E402
 from acquisition.recorder.journal import JournalWriter, read_journal  # noqa: E402
 from acquisition.samples.channel import Channel  # noqa: E402

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from acquisition.files import import_recording
-from acquisition.files.can_database import dbc_text
+from acquisition.files.can_database_text import dbc_text
 from acquisition.samples.channel import Channel
 from acquisition.wire.can_layout import device_database
 from sloshlab.errors import FileFormatError

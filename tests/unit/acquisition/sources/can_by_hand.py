@@ -6,7 +6,7 @@ import socket
 import struct
 import threading
 
-from acquisition.files.can_database import write_dbc
+from acquisition.files.can_database_text import write_dbc
 from acquisition.sources import Channel
 from acquisition.wire.can_layout import device_database
 

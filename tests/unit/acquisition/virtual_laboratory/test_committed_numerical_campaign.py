@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.virtual_laboratory.numerical_campaign import CampaignSettings, make_numerical_campaign
+from acquisition.virtual_laboratory.numerical_campaign import make_numerical_campaign
+from acquisition.virtual_laboratory.numerical_campaign_tasks import CampaignSettings
 from acquisition.virtual_laboratory.numerical_runs import RIG_TEXTS, numerical_runs
 from sloshlab.recording import read_recording
 from sloshlab.rig import Rig

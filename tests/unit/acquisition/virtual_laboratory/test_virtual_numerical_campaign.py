@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from acquisition.virtual_laboratory import numerical_campaign
-from acquisition.virtual_laboratory.numerical_campaign import CampaignSettings, make_numerical_campaign
+from acquisition.virtual_laboratory.numerical_campaign import make_numerical_campaign
+from acquisition.virtual_laboratory.numerical_campaign_tasks import CampaignSettings
 from acquisition.virtual_laboratory.numerical_runs import RIG_TEXTS, NumericalRun, numerical_runs
 from campaigns.task import Ending
 from sloshlab.errors import InputError

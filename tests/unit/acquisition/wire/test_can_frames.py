@@ -10,7 +10,8 @@ import cantools
 import numpy as np
 import pytest
 
-from acquisition.files.can_database import dbc_text, read_layout
+from acquisition.files.can_database import read_layout
+from acquisition.files.can_database_text import dbc_text
 from acquisition.samples.channel import Channel
 from acquisition.wire.can_bits import BitField
 from acquisition.wire.can_frames import (

@@ -7,7 +7,8 @@ from pathlib import Path
 import cantools
 import pytest
 
-from acquisition.files.can_database import LARGEST_DATABASE_BYTES, dbc_text, read_layout, write_dbc
+from acquisition.files.can_database import LARGEST_DATABASE_BYTES, read_layout
+from acquisition.files.can_database_text import dbc_text, write_dbc
 from acquisition.samples.channel import Channel
 from acquisition.wire.can_layout import CanLayout, device_database
 from sloshlab.errors import SourceError

@@ -9,7 +9,8 @@ import cantools
 import numpy as np
 import pytest
 
-from acquisition.files.can_database import dbc_text, read_layout
+from acquisition.files.can_database import read_layout
+from acquisition.files.can_database_text import dbc_text
 from acquisition.samples.channel import Channel
 from acquisition.wire.can_frames import control_frame, decode, encode_samples, read_control_frame
 from acquisition.wire.can_layout import COMMAND, STATUS, device_database
