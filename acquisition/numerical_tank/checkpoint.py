@@ -6,22 +6,18 @@ last listed, so that pairs have the same order and sums the same rounding.
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
-from dataclasses import asdict
 from typing import Any, Final
 
-import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.numerical_tank.checkpoint_file import read_arrays, write_arrays
+from acquisition.numerical_tank.checkpoint_file import read_run, write_run
 from acquisition.numerical_tank.simulation import NumericalTank
 from acquisition.numerical_tank.tank import Box, Liquid, LiquidColumn, Numerics, TankSetup
-from sloshlab.errors import InputError
 
 MAGIC: Final = b"sloshlab numerical tank checkpoint, version 1\n"
-_EXTRA: Final = "extra_"
+_PARTS: Final[dict[str, Any]] = {"box": Box, "column": LiquidColumn, "liquid": Liquid, "numerics": Numerics}
 
 
 def save(
@@ -36,9 +32,7 @@ def save(
     extra : mapping of str to ndarray, optional
         What else must be there to go on: forces so far, the state of a structure.
     """
-    setup = np.frombuffer(json.dumps(asdict(tank.setup)).encode(), np.uint8)
-    more = {_EXTRA + name: values for name, values in (extra or {}).items()}
-    write_arrays(path, MAGIC, {"setup": setup, **tank.checkpoint_arrays(), **more})
+    write_run(path, MAGIC, tank, extra)
 
 
 def load(path: str | os.PathLike[str]) -> NumericalTank:
@@ -68,26 +62,9 @@ def load_with_extra(path: str | os.PathLike[str]) -> tuple[NumericalTank, dict[s
     InputError
         As in `load`.
     """
-    arrays = read_arrays(path, MAGIC)
-    try:
-        tank = NumericalTank(_setup(bytes(arrays.pop("setup"))))
-        tank.restore(arrays)
-    except (KeyError, TypeError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"{path}", got=f"a checkpoint without valid {error}", remedy="start the run again"
-        ) from error
-    return tank, {name.removeprefix(_EXTRA): arrays[name] for name in arrays if name.startswith(_EXTRA)}
+    return read_run(path, MAGIC, _at_rest)
 
 
-def _setup(text: bytes) -> TankSetup:
-    # built anew by their classes, so that all checks of a setup are made again
-    values = json.loads(text.decode())
-    return TankSetup(
-        **{
-            **values,
-            "box": Box(**values["box"]),
-            "column": LiquidColumn(**values["column"]),
-            "liquid": Liquid(**values["liquid"]),
-            "numerics": Numerics(**values["numerics"]),
-        }
-    )
+def _at_rest(values: dict[str, Any]) -> NumericalTank:
+    parts = {name: part(**values.pop(name)) for name, part in _PARTS.items()}
+    return NumericalTank(TankSetup(**parts, **values))

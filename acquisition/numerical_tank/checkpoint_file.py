@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import hashlib
 import io
+import json
 import os
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +24,96 @@ from sloshlab.errors import InputError
 # looked at before the file is read into memory
 LARGEST_FILE_BYTES: Final = 256 * 2**20
 _HASH_BYTES: Final = 32
+_EXTRA: Final = "extra_"
+
+
+class StoredRun(Protocol):
+    """A computation that can be stopped and taken up."""
+
+    setup: Any  # a frozen dataclass
+
+    def checkpoint_arrays(self) -> dict[str, NDArray[Any]]:
+        """Copies of everything that a later step depends on."""
+
+    def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
+        """Take up the state that `checkpoint_arrays` returned."""
+
+
+R = TypeVar("R", bound=StoredRun)
+
+
+def write_run(
+    path: str | os.PathLike[str], magic: bytes, run: StoredRun, extra: Mapping[str, NDArray[Any]] | None
+) -> None:
+    """Write the whole state of a run, atomically.
+
+    Parameters
+    ----------
+    path : path-like
+    magic : bytes
+    run : StoredRun
+    extra : mapping of str to ndarray, optional
+        What else must be there to go on.
+    """
+    setup = np.frombuffer(json.dumps(asdict(run.setup)).encode(), np.uint8)
+    more = {_EXTRA + name: values for name, values in (extra or {}).items()}
+    write_arrays(path, magic, {"setup": setup, **run.checkpoint_arrays(), **more})
+
+
+def read_run(
+    path: str | os.PathLike[str], magic: bytes, at_rest: Callable[[dict[str, Any]], R]
+) -> tuple[R, dict[str, NDArray[Any]]]:
+    """Read what `write_run` wrote; return the run, ready to go on, and what was saved with it.
+
+    Parameters
+    ----------
+    path : path-like
+    magic : bytes
+    at_rest : callable
+        The run of a setup that is given as plain values, built anew so that all its checks are made again.
+
+    Raises
+    ------
+    InputError
+        If the file is no checkpoint, is damaged, or describes a run that cannot be.
+    """
+    arrays = read_arrays(path, magic)
+    try:
+        run = at_rest(json.loads(bytes(arrays.pop("setup")).decode()))
+        run.restore(arrays)
+    except (AttributeError, KeyError, TypeError, UnicodeDecodeError) as error:
+        raise InputError(
+            f"{path}", got=f"a checkpoint without valid {error}", remedy="start the run again"
+        ) from error
+    return run, {name.removeprefix(_EXTRA): arrays[name] for name in arrays if name.startswith(_EXTRA)}
+
+
+def take_up(targets: Mapping[str, NDArray[Any]], arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Fill arrays in place from those of a checkpoint.
+
+    Parameters
+    ----------
+    targets : mapping of str to ndarray
+        By their names in the checkpoint.
+    arrays : mapping of str to ndarray
+
+    Raises
+    ------
+    KeyError
+        If one is missing.
+    InputError
+        If one has another shape or type, or is not finite.
+    """
+    for name, target in targets.items():
+        given = arrays[name]
+        # the file may belong to another tank; an array of another shape would be broadcast without a word
+        if given.shape != target.shape or given.dtype != target.dtype or not np.isfinite(given).all():
+            raise InputError(
+                f"checkpoint, {name}",
+                got=f"{given.dtype} {given.shape}",
+                allowed=f"finite {target.dtype} {target.shape}",
+            )
+        target[...] = given
 
 
 def write_arrays(path: str | os.PathLike[str], magic: bytes, arrays: Mapping[str, NDArray[Any]]) -> None:

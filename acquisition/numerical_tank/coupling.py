@@ -21,12 +21,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from acquisition.numerical_tank import stepping
 from acquisition.numerical_tank.carried_tank import CarriedTank, StructureHistory, as_base
+from acquisition.numerical_tank.checkpoint_file import take_up
 from acquisition.numerical_tank.simulation import NumericalTank
 from acquisition.numerical_tank.stepping import FORCE_Z, NO_ROOM, RUNNING, begin_step, end_step, pairs_are_listed
 from acquisition.numerical_tank.structure_motion import HANDED_OVER, step_structure
 from acquisition.numerical_tank.structures import Structure
 from acquisition.numerical_tank.tank import TankSetup
-from sloshlab.errors import InputError
 
 FloatArray = NDArray[np.float64]
 
@@ -116,15 +116,8 @@ class CoupledTank(CarriedTank):
             If one does not belong to this structure or is not finite.
         """
         start = np.zeros(1)
-        for name, target in {**self._kept(), "start": start}.items():
-            given = arrays[f"structure_{name}"]
-            if given.shape != target.shape or given.dtype != target.dtype or not np.isfinite(given).all():
-                raise InputError(
-                    f"checkpoint, structure_{name}",
-                    got=f"{given.dtype} {given.shape}",
-                    allowed=f"finite {target.dtype} {target.shape}",
-                )
-            target[...] = given
+        targets = {f"structure_{name}": target for name, target in {**self._kept(), "start": start}.items()}
+        take_up(targets, arrays)
         self._start_j = float(start[0])
 
     def _kept(self) -> dict[str, FloatArray]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from acquisition.numerical_tank import energy, stepping
+from acquisition.numerical_tank.checkpoint_file import take_up
 from acquisition.numerical_tank.energy import EnergyAccount
 from acquisition.numerical_tank.initial_state import constants_of, particles_at_rest
 from acquisition.numerical_tank.instability import InstabilityError
@@ -266,16 +267,7 @@ class NumericalTank:
         n = self.setup.n_particles
         targets = {f"particles_{name}": getattr(self._particles, name)[:n] for name in _KEPT}
         targets |= {"sums": self._sums, "counters": self._counters, "start": np.zeros(3)}
-        for name, target in targets.items():
-            given = arrays[name]
-            # the file may belong to another tank; an array of another shape would be broadcast without a word
-            if given.shape != target.shape or given.dtype != target.dtype or not np.isfinite(given).all():
-                raise InputError(
-                    f"checkpoint, {name}",
-                    got=f"{given.dtype} {given.shape}",
-                    allowed=f"finite {target.dtype} {target.shape}",
-                )
-            target[...] = given
+        take_up(targets, arrays)
         self._start = (float(targets["start"][0]), float(targets["start"][1]), float(targets["start"][2]))
         self._relist()
 

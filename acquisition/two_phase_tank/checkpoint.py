@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
-from dataclasses import asdict
 from typing import Any, Final
 
-import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.numerical_tank.checkpoint_file import read_arrays, write_arrays
+from acquisition.numerical_tank.checkpoint_file import read_run, write_run
 from acquisition.numerical_tank.tank import Box, LiquidColumn
 from acquisition.two_phase_tank.setup import Fluids, GridNumerics, TwoPhaseSetup, Walls
 from acquisition.two_phase_tank.simulation import TwoPhaseTank
-from sloshlab.errors import InputError
 
 MAGIC: Final = b"sloshlab two-phase tank checkpoint, version 2\n"
-_EXTRA: Final = "extra_"
-_PARTS: Final = {
+_PARTS: Final[dict[str, Any]] = {
     "box": Box,
     "column": LiquidColumn,
     "fluids": Fluids,
@@ -40,9 +35,7 @@ def save(
     extra : mapping of str to ndarray, optional
         What else must be there to go on: forces so far.
     """
-    setup = np.frombuffer(json.dumps(asdict(tank.setup)).encode(), np.uint8)
-    more = {_EXTRA + name: values for name, values in (extra or {}).items()}
-    write_arrays(path, MAGIC, {"setup": setup, **tank.checkpoint_arrays(), **more})
+    write_run(path, MAGIC, tank, extra)
 
 
 def load(path: str | os.PathLike[str]) -> TwoPhaseTank:
@@ -72,15 +65,9 @@ def load_with_extra(path: str | os.PathLike[str]) -> tuple[TwoPhaseTank, dict[st
     InputError
         As in `load`.
     """
-    arrays = read_arrays(path, MAGIC)
-    try:
-        values = json.loads(bytes(arrays.pop("setup")).decode())
-        # built anew by their classes, so that all checks of a setup are made again
-        parts = {name: part(**values.pop(name)) for name, part in _PARTS.items()}
-        tank = TwoPhaseTank(TwoPhaseSetup(**parts, **values))
-        tank.restore(arrays)
-    except (KeyError, TypeError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"{path}", got=f"a checkpoint without valid {error}", remedy="start the run again"
-        ) from error
-    return tank, {name.removeprefix(_EXTRA): arrays[name] for name in arrays if name.startswith(_EXTRA)}
+    return read_run(path, MAGIC, _at_rest)
+
+
+def _at_rest(values: dict[str, Any]) -> TwoPhaseTank:
+    parts = {name: part(**values.pop(name)) for name, part in _PARTS.items()}
+    return TwoPhaseTank(TwoPhaseSetup(**parts, **values))

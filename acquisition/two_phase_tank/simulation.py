@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from acquisition.numerical_tank.checkpoint_file import take_up
 from acquisition.numerical_tank.instability import InstabilityError
 from acquisition.two_phase_tank import energy, stepping
 from acquisition.two_phase_tank.energy import TwoPhaseAccount
@@ -255,16 +256,7 @@ class TwoPhaseTank:
             f"state_{name}": value for name, value in self._state._asdict().items()
         }
         targets |= {"sums": self._sums, "counters": self._counters, "start": np.zeros(3)}
-        for name, target in targets.items():
-            given = arrays[name]
-            # the file may belong to another tank; an array of another shape would be broadcast without a word
-            if given.shape != target.shape or given.dtype != target.dtype or not np.isfinite(given).all():
-                raise InputError(
-                    f"checkpoint, {name}",
-                    got=f"{given.dtype} {given.shape}",
-                    allowed=f"finite {target.dtype} {target.shape}",
-                )
-            target[...] = given
+        take_up(targets, arrays)
         find_density(self._state.c, self._work, self._constants)
         self._start = (float(targets["start"][0]), float(targets["start"][1]), float(targets["start"][2]))
 

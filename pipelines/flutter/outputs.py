@@ -24,24 +24,26 @@ from pipelines.report.tables import Table, provenance_table
 from sloshlab import __version__
 from sloshlab.quantities import described
 
+DOUBLET_LATTICE: Final = Citation(
+    "doublet lattice",
+    "E. Albano, W. P. Rodden: A doublet-lattice method for calculating lift distributions on oscillating "
+    "surfaces in subsonic flows. AIAA Journal 7, 279–285 (1969).",
+    "10.2514/3.5086",
+)
+P_K_METHOD: Final = Citation(
+    "p-k method",
+    "H. J. Hassig: An approximate true damping solution of the flutter equation by determinant iteration. "
+    "Journal of Aircraft 8, 885–889 (1971).",
+    "10.2514/3.44311",
+)
 PAPERS: Final = (
     Citation(
         "strip theory",
         "T. Theodorsen: General theory of aerodynamic instability and the mechanism of flutter. NACA Report 496 "
         "(1935).",
     ),
-    Citation(
-        "doublet lattice",
-        "E. Albano, W. P. Rodden: A doublet-lattice method for calculating lift distributions on oscillating "
-        "surfaces in subsonic flows. AIAA Journal 7, 279–285 (1969).",
-        "10.2514/3.5086",
-    ),
-    Citation(
-        "p-k method",
-        "H. J. Hassig: An approximate true damping solution of the flutter equation by determinant iteration. "
-        "Journal of Aircraft 8, 885–889 (1971).",
-        "10.2514/3.44311",
-    ),
+    DOUBLET_LATTICE,
+    P_K_METHOD,
     Citation(
         "minimum state",
         "M. Karpel: Design for active flutter suppression and gust alleviation using state-space aeroelastic "

@@ -10,7 +10,7 @@ from typing import Any
 import xarray as xr
 
 from pipelines.flutter import figures as stability_figures
-from pipelines.report.citations import Citation
+from pipelines.flutter.outputs import DOUBLET_LATTICE, P_K_METHOD
 from pipelines.report.numbers import signed, text
 from pipelines.report.outputs import RESULT_ID, provenance_of, report_lines, stamp_of, write_dataset
 from pipelines.report.page import Page
@@ -21,20 +21,6 @@ from pipelines.wing import datasets, figures, tables
 from pipelines.wing.results import BETA_HAT, SLOSHING, GustCase, WingExperiment, WingResult
 from sloshlab import __version__
 
-_PAPERS = (
-    Citation(
-        "doublet lattice",
-        "E. Albano, W. P. Rodden: A doublet-lattice method for calculating lift distributions on oscillating "
-        "surfaces in subsonic flows. AIAA Journal 7, 279–285 (1969).",
-        "10.2514/3.5086",
-    ),
-    Citation(
-        "p-k method",
-        "H. J. Hassig: An approximate true damping solution of the flutter equation by determinant iteration. "
-        "Journal of Aircraft 8, 885–889 (1971).",
-        "10.2514/3.44311",
-    ),
-)
 _COUNTERPARTS = ("Fig. 3.7", "Fig. 3.8", "Fig. 3.9", "Fig. 3.10", "Fig. 3.10")
 
 
@@ -158,7 +144,7 @@ def _page(experiment: WingExperiment) -> Page:
         flags=experiment.flags,
         summary=_sentences(experiment),
         plans=tuple(sections),
-        papers=_PAPERS,
+        papers=(DOUBLET_LATTICE, P_K_METHOD),
     )
 
 

@@ -61,21 +61,27 @@ def rows(findings: Sequence[Finding]) -> Iterator[str]:
         yield f"| {f.case} | {f.quantity} | {f.measured:.4g} | {f.expected:.4g} | {allowed} | {verdict} |"
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the cases; return 0 if all tolerances are met, else 1.
+def verified(
+    description: str, quick: Sequence[Case], long: Sequence[Case], arguments: Sequence[str] | None
+) -> int:
+    """Run cases and tabulate what they find; return 0 if all tolerances are met, else 1.
 
     Parameters
     ----------
+    description : str
+        Of the command.
+    quick, long : sequence of Case
+        Those that always run, and those that run when they are asked for.
     arguments : sequence of str, optional
         As on the command line.
     """
-    parser = argparse.ArgumentParser(description="Verify the numerical tank against theory and experiment.")
+    parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--long", action="store_true", help="also the cases that take many minutes")
     parser.add_argument("--output", type=Path, help="write the table to this file")
     chosen = parser.parse_args(arguments)
     lines = ["| case | quantity | measured | expected | tolerance | met |", "|---|---|---|---|---|---|"]
     met = True
-    for case in QUICK + (LONG if chosen.long else ()):
+    for case in (*quick, *(long if chosen.long else ())):
         findings = case()
         met &= all(finding.met for finding in findings)
         lines += rows(findings)
@@ -84,6 +90,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if chosen.output:
         write_bytes(chosen.output, ("\n".join(lines) + "\n").encode())
     return 0 if met else 1
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the cases; return 0 if all tolerances are met, else 1.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        As on the command line.
+    """
+    return verified("Verify the numerical tank against theory and experiment.", QUICK, LONG, arguments)
 
 
 if __name__ == "__main__":
