@@ -118,7 +118,7 @@ class UntrustedFile:
             return reader(*arguments)
         answer, store = (_by_fork if fork else _by_interpreter)(self, reader, arguments)
         if "error" in answer:
-            raise _told_error(answer["error"])
+            raise _error_of_child(answer["error"])
         if "memory" in answer:
             raise self.refused(f"more than the {self.limits.memory_bytes / 2**30:.1f} GiB that reading may take")
         if "unexpected" in answer:
@@ -336,8 +336,8 @@ def _mapped(descriptor: int) -> memoryview:
     return memoryview(mmap.mmap(descriptor, size)) if size else memoryview(bytearray())
 
 
-def _told_error(told: list[str]) -> Exception:
-    name, *parts = told
+def _error_of_child(answer: list[str]) -> Exception:
+    name, *parts = answer
     if name == "MissingExtraError":
         return MissingExtraError(parts[0], extra=parts[1], purpose=parts[2])
     what, got, allowed, remedy = parts

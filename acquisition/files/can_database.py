@@ -48,6 +48,7 @@ def read_layout(source: Path | str) -> CanLayout:
     --------
     >>> from acquisition.wire.can_layout import device_database
     >>> layout = device_database("cells", 1000.0, None, [Channel("force_cell_1", "force", "N")])
+    >>> from acquisition.files.can_database_text import dbc_text
     >>> read_layout(dbc_text(layout)) == layout
     True
     """

@@ -157,10 +157,10 @@ def _as_task(task: CampaignTask) -> Task:
         "laboratory_seed": task.laboratory_seed,
         "with_gas": task.with_gas,
     }
-    return Task(task.run.name, "acquisition.virtual_laboratory.numerical_campaign:record_told_run", arguments)
+    return Task(task.run.name, "acquisition.virtual_laboratory.numerical_campaign:record_run_of_task", arguments)
 
 
-def record_told_run(arguments: Mapping[str, Any], say_share: Callable[[float], None]) -> dict[str, Any]:
+def record_run_of_task(arguments: Mapping[str, Any], say_share: Callable[[float], None]) -> dict[str, Any]:
     """Make one recording as another process is told it; this is what a worker does.
 
     Parameters

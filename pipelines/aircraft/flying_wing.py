@@ -133,14 +133,14 @@ def _planned(
 ) -> tuple[GustCase, ...]:
     b = problem.rational.semi_chord_m
     if settings.gust is not None:
-        return (_one(settings.gust, b),)
+        return (_case_of(settings.gust, b),)
     flutter = {name: first_flutter(found) for name, found in crossings.items()}
     speeds = {name: found.speed_m_per_s for name, found in flutter.items() if found is not None}
     n_tanks = 0 if problem.flown is None else len(problem.flown.model.tanks)
     return source_gusts(n_tanks, speeds, b)
 
 
-def _one(gust: OneGust, semi_chord_m: float) -> GustCase:
+def _case_of(gust: OneGust, semi_chord_m: float) -> GustCase:
     length = USUAL_LENGTH_IN_SEMI_CHORDS * semi_chord_m if gust.length_m is None else gust.length_m
     name = f"{gust.amplitude_m_per_s:g} m/s at {gust.speed_m_per_s:g} m/s"
     return GustCase(name, gust.speed_m_per_s, gust.amplitude_m_per_s, length)

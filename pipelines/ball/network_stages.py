@@ -116,7 +116,7 @@ def _trained(
 ) -> tuple[ReducedOrderModel, TrainingRecord]:
     with amounts("train") as advance:
 
-        def told(epoch: Epoch) -> None:
+        def show_epoch(epoch: Epoch) -> None:
             errors = f"error {epoch.training_mse**0.5:.4g} N, validation {epoch.validation_mse**0.5:.4g} N"
             advance(epoch.number, settings.training.n_steps, f"step {epoch.number}, {errors}")
 
@@ -129,7 +129,7 @@ def _trained(
             [validation],
             sampling_rate_hz=settings.rate_hz,
             settings=settings.training,
-            on_epoch=told,
+            on_epoch=show_epoch,
         )
 
 

@@ -102,8 +102,8 @@ class SweepPlots:
             )
         rig = next((found for found in self.experiment.rigs if found.name == run.rig_name), None)
         rate_hz, start_s = run.attributes.sampling_rate_hz, run.start_time_s
-        one = run.windows.isel(window=at)
-        excerpt = excerpt_of(one, run.signals, None if rig is None else rig.rig, rate_hz, start_s)
+        window = run.windows.isel(window=at)
+        excerpt = excerpt_of(window, run.signals, None if rig is None else rig.rig, rate_hz, start_s)
         panels = panel_of(excerpt, None if rig is None else rig.rig.liquid_mass_kg)
         with axes_to_draw_on(ax) as axes:
             draw_loops(axes, panels.panels[0])

@@ -60,7 +60,7 @@ def trained_ensemble(
     network.pop("n_inputs")
     with amounts("ensemble") as advance:
 
-        def told(member: int, epoch: Epoch) -> None:
+        def show_epoch(member: int, epoch: Epoch) -> None:
             per_member = settings.n_starts * (settings.n_epochs + 1)
             done = member * per_member + epoch.start * (settings.n_epochs + 1) + epoch.number + 1
             advance(done, n_members * per_member)
@@ -75,7 +75,7 @@ def trained_ensemble(
             settings=settings,
             n_members=n_members,
             agitation=model.agitation,
-            on_epoch=told,
+            on_epoch=show_epoch,
         )
     ensemble.facts.update(model.facts)
     return ensemble

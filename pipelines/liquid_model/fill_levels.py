@@ -228,7 +228,7 @@ def _fitted(
 ) -> tuple[ReducedOrderModel, TrainingRecord]:
     with amounts("train") as advance:
 
-        def told(epoch: Epoch) -> None:
+        def show_epoch(epoch: Epoch) -> None:
             done = epoch.start * (settings.n_epochs + 1) + epoch.number + 1
             advance(done, settings.n_starts * (settings.n_epochs + 1), f"epoch {epoch.number}")
 
@@ -241,7 +241,7 @@ def _fitted(
             sampling_rate_hz=runs.rate_hz,
             settings=settings,
             with_fill=True,
-            on_epoch=told,
+            on_epoch=show_epoch,
         )
 
 

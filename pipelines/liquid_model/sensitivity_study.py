@@ -242,10 +242,10 @@ def _as_task(task: _Task, signals: Path) -> Task:
         "settings": asdict(task.settings),
         "facts": task.facts,
     }
-    return Task(task.case.name, "pipelines.liquid_model.sensitivity_study:train_told_case", arguments)
+    return Task(task.case.name, "pipelines.liquid_model.sensitivity_study:train_case_of_task", arguments)
 
 
-def train_told_case(arguments: Mapping[str, Any], say_share: Callable[[float], None]) -> None:
+def train_case_of_task(arguments: Mapping[str, Any], say_share: Callable[[float], None]) -> None:
     """Train one case as another process is told it; this is what a worker does.
 
     Parameters
@@ -322,7 +322,7 @@ def trained_case(
     """
     n_epochs = settings.n_starts * (settings.n_epochs + 1) * (2 if case.output_delays else 1)
 
-    def told(epoch: Epoch) -> None:
+    def show_epoch(epoch: Epoch) -> None:
         say_share(min(1.0, (epoch.start * n_epochs / settings.n_starts + epoch.number + 1) / n_epochs))
 
     try:
@@ -334,7 +334,7 @@ def trained_case(
             validation,
             sampling_rate_hz=sampling_rate_hz,
             settings=settings,
-            on_epoch=told,
+            on_epoch=show_epoch,
         )
     except AnalysisError as error:
         return None, _failed(case, " ".join(str(error).split()))

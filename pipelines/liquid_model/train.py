@@ -85,7 +85,7 @@ def trained_model(files: RunFiles, wanted: ModelSettings, settings: TrainingSett
     n_epochs = (settings.n_epochs + 1) * (2 if wanted.structure == "noe" else 1)
     with amounts("train") as advance:
 
-        def told(epoch: Epoch) -> None:
+        def show_epoch(epoch: Epoch) -> None:
             done = epoch.start * n_epochs + epoch.number + 1
             errors = f"epoch {epoch.number}, error {epoch.training_mse**0.5:.4g} N, validation "
             advance(done, settings.n_starts * n_epochs, f"{errors}{epoch.validation_mse**0.5:.4g} N")
@@ -99,7 +99,7 @@ def trained_model(files: RunFiles, wanted: ModelSettings, settings: TrainingSett
             sampling_rate_hz=runs.rate_hz,
             settings=settings,
             agitation=wanted.agitation(),
-            on_epoch=told,
+            on_epoch=show_epoch,
         )
     errors = {"training_mse_n2": record.best.training_mse, "validation_mse_n2": record.best.validation_mse}
     model.facts.update(runs.facts() | errors)

@@ -249,10 +249,10 @@ def _laboratory(run: VirtualRun, rig: Rig) -> Laboratory | StructureLaboratory:
 def _laboratory_attributes(run: VirtualRun, rig: Rig) -> dict[str, Any]:
     """What a recording says of the laboratory."""
     deviations = {} if run.laboratory_seed is None else _laboratory(run, rig).deviations()
-    told = {"laboratory": "exact", DEVIATIONS: json.dumps(deviations, sort_keys=True)}
+    stated = {"laboratory": "exact", DEVIATIONS: json.dumps(deviations, sort_keys=True)}
     if run.laboratory_seed is None:
-        return told
-    return told | {"laboratory": "drawn", "laboratory_seed": run.laboratory_seed}
+        return stated
+    return stated | {"laboratory": "drawn", "laboratory_seed": run.laboratory_seed}
 
 
 def deviation_lines(seed: int | None, deviations: Mapping[str, Any]) -> list[str]:
@@ -314,9 +314,9 @@ def make_campaign_folder(
             progress=lambda done, of, name: advance(name),
         )
     deviations = campaign_laboratory(settings.laboratory_seed).deviations()
-    told = deviation_lines(settings.laboratory_seed, deviations)
+    laboratory = deviation_lines(settings.laboratory_seed, deviations)
     return {
-        "lines": [f"manifest: {manifest}", *(f"laboratory: {line}" for line in told)],
+        "lines": [f"manifest: {manifest}", *(f"laboratory: {line}" for line in laboratory)],
         "flags": [],
         "output": str(folder),
         "laboratory_seed": settings.laboratory_seed,
@@ -336,7 +336,7 @@ def _make_numerical_campaign_folder(
 
     share, start_s = [0.0], time.monotonic()
 
-    def told(run: FinishedRun) -> None:
+    def say_finished(run: FinishedRun) -> None:
         left_s = (time.monotonic() - start_s) * (1 - share[0]) / max(share[0], 1e-6)
         ending = f" ({run.flag})" if run.flag else ""
         say(
@@ -351,7 +351,7 @@ def _make_numerical_campaign_folder(
             advance(round(10_000 * now), 10_000)
 
         summary = make_numerical_campaign(
-            folder, settings, progressed=progressed, finished=told, executor=executor
+            folder, settings, progressed=progressed, finished=say_finished, executor=executor
         )
     lines = [f"made: {summary.n_made}, kept: {summary.n_kept}", f"manifest: {summary.manifest}"]
     return {

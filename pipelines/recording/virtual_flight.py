@@ -142,13 +142,13 @@ def hidden_of(text: str, n_tanks: int) -> HiddenFlight:
             for tank, numbers in of_tanks.items()
             if "peak_w_bar" in numbers
         },
-        effective_mass=_one(of_tanks, "effective_mass"),
-        fill_levels=_one(of_tanks, "fill_level"),
-        liquid_loss_kg_per_s=_one(of_tanks, "liquid_loss_kg_per_s"),
+        effective_mass=_by_tank(of_tanks, "effective_mass"),
+        fill_levels=_by_tank(of_tanks, "fill_level"),
+        liquid_loss_kg_per_s=_by_tank(of_tanks, "liquid_loss_kg_per_s"),
     )
 
 
-def _one(of_tanks: dict[int, dict[str, float]], name: str) -> dict[int, float]:
+def _by_tank(of_tanks: dict[int, dict[str, float]], name: str) -> dict[int, float]:
     return {tank: numbers[name] for tank, numbers in of_tanks.items() if name in numbers}
 
 

@@ -88,12 +88,12 @@ def make_repeats(
         require_free_place(folder / each.name, overwrite=overwrite, described="recording")
     lines: list[str] = []
     flags: list[str] = []
-    told: dict[str, Any] = {}
+    made: dict[str, Any] = {}
     for each in planned:
-        told = make_virtual_run(each.run, rig, folder / each.name, overwrite=overwrite, attributes=each.attributes)
-        lines.append(told["lines"][0])
-        flags += told["flags"]
-    lines += told["lines"][1:]
+        made = make_virtual_run(each.run, rig, folder / each.name, overwrite=overwrite, attributes=each.attributes)
+        lines.append(made["lines"][0])
+        flags += made["flags"]
+    lines += made["lines"][1:]
     if run.experiment in _RANDOM and n_repeats > 1:
         lines.append(f"every run of {run.experiment} draws its own motion: realisations, no repeats of one test")
     return {
@@ -101,8 +101,8 @@ def make_repeats(
         "flags": flags,
         "output": str(folder),
         "recordings": [str(folder / each.name) for each in planned],
-        "laboratory_seed": told["laboratory_seed"],
-        "laboratory_deviations": told["laboratory_deviations"],
+        "laboratory_seed": made["laboratory_seed"],
+        "laboratory_deviations": made["laboratory_deviations"],
     }
 
 
@@ -113,15 +113,15 @@ def _planned(run: VirtualRun, n_repeats: int, levels: Sequence[float]) -> list[_
     chosen: Sequence[float | None] = levels or (None,)
     planned = []
     for number, (level, repeat) in enumerate(itertools.product(chosen, range(1, n_repeats + 1))):
-        one = replace(run, seed=run.seed + number)
+        chosen_run = replace(run, seed=run.seed + number)
         words = [run.experiment, run.configuration]
         if level is not None:
-            one = _at_level(one, level)
+            chosen_run = _at_level(chosen_run, level)
             words.append(f"{level:g}")
         attributes: dict[str, Any] = {"repeat": repeat}
         if run.experiment in _RANDOM:
             attributes = {"repeat": 1, "test": f"realisation {number + 1}"}
-        planned.append(_PlannedRun(one, f"{'_'.join(words)}_repeat_{repeat}.nc", attributes))
+        planned.append(_PlannedRun(chosen_run, f"{'_'.join(words)}_repeat_{repeat}.nc", attributes))
     return planned
 
 

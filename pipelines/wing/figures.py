@@ -273,14 +273,14 @@ def _zero_lines(axes: Axes, balance: EnergyBalance | None) -> None:
 
 def energy(name: str, *, balance: EnergyBalance, found: Bifurcation) -> ReportFigure:
     """Works of air, liquid and all over speed and amplitude."""
-    one = balance.frozen
+    frozen = balance.frozen
     figure = new_figure(3.6)
     panels = figure.subplots(1, 3, sharey=True)
-    top = _top_mm(one, found)
-    keep = 1e3 * one.amplitude_m <= top
-    speed, amplitude = one.mode.speed_m_per_s, 1e3 * one.amplitude_m[keep]
+    top = _top_mm(frozen, found)
+    keep = 1e3 * frozen.amplitude_m <= top
+    speed, amplitude = frozen.mode.speed_m_per_s, 1e3 * frozen.amplitude_m[keep]
     for axes, values, title in zip(
-        panels, (one.aero, one.slosh, one.total), ("air", "liquid", "air, liquid, structure"), strict=True
+        panels, (frozen.aero, frozen.slosh, frozen.total), ("air", "liquid", "air, liquid, structure"), strict=True
     ):
         shown = values[:, keep].T
         size = float(np.nanpercentile(np.abs(shown), 98)) if np.isfinite(shown).any() else 1.0

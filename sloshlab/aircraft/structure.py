@@ -312,7 +312,7 @@ def _structure(source: Any) -> AircraftStructure:
     def floats(name: str) -> FloatArray:
         return np.asarray(held[name], dtype=np.float64)
 
-    def one(name: str) -> float | None:
+    def number(name: str) -> float | None:
         return float(held[name][0]) if name in held else None
 
     panels = [
@@ -349,8 +349,8 @@ def _structure(source: Any) -> AircraftStructure:
         is_free=bool(held["is_free"][0]),
         panels=tuple(panels),
         splines=tuple(splines),
-        reference_chord_m=one("reference_chord"),
-        density_kg_per_m3=one("density"),
+        reference_chord_m=number("reference_chord"),
+        density_kg_per_m3=number("density"),
         facts=facts,
     )
 

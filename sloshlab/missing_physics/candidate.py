@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sloshlab.errors import InputError, SloshlabError
 from sloshlab.missing_physics.extension import Extension
-from sloshlab.missing_physics.prior import ParameterPrior, Range, about, drawn, one, prior_of
+from sloshlab.missing_physics.prior import ParameterPrior, Range, about, drawn, prior_of, unit_scale
 from sloshlab.missing_physics.units import named_and_units
 from sloshlab.registry import Registry
 from sloshlab.rig import Rig
@@ -160,7 +160,7 @@ def multiples(
     parameters: Sequence[EffectParameter], *sets: Numbers
 ) -> Callable[[Surroundings], Iterable[Numbers]]:
     """Starts that are stated in multiples of the scales of the parameters' ranges."""
-    scales = {known.name: known.range.scale if known.range else one for known in parameters}
+    scales = {known.name: known.range.scale if known.range else unit_scale for known in parameters}
     return lambda at: [{name: share * scales[name](at) for name, share in numbers.items()} for numbers in sets]
 
 

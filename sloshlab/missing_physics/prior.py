@@ -23,7 +23,7 @@ _SEED: Final = 0
 """Scrambles the sequence, which in ten dimensions is a few lines if it is not; always the same one."""
 
 
-def one(surroundings: Any) -> float:
+def unit_scale(surroundings: Any) -> float:
     """The scale of a number without one: a ratio, or a number in its own unit."""
     del surroundings
     return 1.0
@@ -47,7 +47,7 @@ class Range:
 
     low: float
     high: float
-    scale: Callable[[Any], float] = one
+    scale: Callable[[Any], float] = unit_scale
     is_log: bool = True
     may_be_negative: bool = False
 

@@ -149,18 +149,20 @@ def _of_channels(found: RetunedBaseline) -> dict[str, float]:
     worst, quietest, size_of_worst = "", math.inf, -math.inf
     for observed, residuals in per_run:
         for observation, residual in zip(observed, residuals, strict=True):
-            one = _of_channel(found, observation, residual)
-            by_role.setdefault(_role(observation.channel), []).append(one)
-            quietest = min(quietest, one["size"])
-            if one["size"] > size_of_worst:
-                worst, size_of_worst = observation.channel, one["size"]
+            channel = _of_channel(found, observation, residual)
+            by_role.setdefault(_role(observation.channel), []).append(channel)
+            quietest = min(quietest, channel["size"])
+            if channel["size"] > size_of_worst:
+                worst, size_of_worst = observation.channel, channel["size"]
     features = {f"worst is {_role(worst)}": 1.0, "worst over quietest": size_of_worst - quietest}
-    everything = [one for several in by_role.values() for one in several]
-    for role, several in {**by_role, "any": [max(everything, key=lambda one: one["size"])]}.items():
+    everything = [channel for several in by_role.values() for channel in several]
+    for role, several in {**by_role, "any": [max(everything, key=lambda channel: channel["size"])]}.items():
         for name in several[0]:
-            features[f"{name} of {role}"] = float(np.median([one[name] for one in several if name in one]))
+            features[f"{name} of {role}"] = float(
+                np.median([channel[name] for channel in several if name in channel])
+            )
         features[f"dependence on level of {role}"] = _over_level(several)
-        features[f"largest size of {role}"] = max(one["size"] for one in several)
+        features[f"largest size of {role}"] = max(channel["size"] for channel in several)
     return features
 
 

@@ -13,7 +13,7 @@ import pytest
 
 from acquisition.virtual_laboratory import numerical_campaign
 from acquisition.virtual_laboratory.numerical_campaign import make_numerical_campaign
-from acquisition.virtual_laboratory.numerical_campaign_tasks import CampaignSettings
+from acquisition.virtual_laboratory.numerical_campaign_tasks import CampaignSettings, campaign_tasks
 from acquisition.virtual_laboratory.numerical_runs import RIG_TEXTS, NumericalRun, numerical_runs
 from campaigns.task import Ending
 from sloshlab.errors import InputError
@@ -51,7 +51,7 @@ def one_after_another(tasks, executor, *, progressed, finished) -> None:
     """Stands in for `work_through` without other processes."""
     for number, task in enumerate(tasks):
         told = partial(progressed, number)
-        finished(number, Ending("done", numerical_campaign.record_told_run(task.arguments, told)))
+        finished(number, Ending("done", numerical_campaign.record_run_of_task(task.arguments, told)))
 
 
 @pytest.fixture(scope="module")
@@ -265,7 +265,7 @@ def test_a_second_campaign_in_the_same_place_is_refused(campaign, monkeypatch) -
 
 
 def test_a_damaged_checkpoint_does_not_stop_a_campaign(tmp_path: Path) -> None:
-    task = numerical_campaign._tasks(tmp_path, COARSE, SHORT[:1])[0]
+    task = campaign_tasks(tmp_path, COARSE, SHORT[:1])[0]
     task.checkpoint.parent.mkdir()
     task.checkpoint.write_bytes(b"nonsense")
     numerical_campaign.record(task, lambda share: None)
