@@ -88,7 +88,8 @@ def trained(
     InputError
         If a recording is bad, or the case cannot be trained.
     """
-    from pipelines.liquid_model.sensitivity_study import MODEL_NAME, StudyCase, trained_case
+    from pipelines.liquid_model.sensitivity_study import MODEL_NAME, trained_case
+    from pipelines.liquid_model.study_cases import StudyCase
     from pipelines.liquid_model.training_runs import RunFiles, training_runs
     from sloshlab.reduced_order_model.storage import save_model
     from sloshlab.reduced_order_model.training import TrainingSettings

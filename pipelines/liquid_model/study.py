@@ -11,14 +11,8 @@ import numpy as np
 import xarray as xr
 
 from campaigns.where import Where, executor_of
-from pipelines.liquid_model.sensitivity_study import (
-    FURTHER_CASES,
-    MODEL_NAME,
-    SOURCE_CASES,
-    CaseResult,
-    picked,
-    sensitivity_study,
-)
+from pipelines.liquid_model.sensitivity_study import MODEL_NAME, sensitivity_study
+from pipelines.liquid_model.study_cases import FURTHER_CASES, SOURCE_CASES, CaseResult, picked
 from pipelines.liquid_model.study_page import StudiedModels, page_of
 from pipelines.liquid_model.training_runs import RunFiles, training_runs
 from pipelines.report.outputs import RESULT_ID, provenance_of, report_lines, stamp_of, write_dataset

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pipelines.liquid_model.sections import PAPERS
-from pipelines.liquid_model.sensitivity_study import CaseResult, Pick
+from pipelines.liquid_model.study_cases import CaseResult, Pick
 from pipelines.report.figure import NothingToDrawError, ReportFigure
 from pipelines.report.numbers import text
 from pipelines.report.page import Page

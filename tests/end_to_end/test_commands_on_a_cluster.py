@@ -17,7 +17,7 @@ from test_diagnose_command import case, decay
 import pipelines.liquid_model.study
 from acquisition.virtual_laboratory.shaker_run import write_virtual_run
 from pipelines.command_line import run
-from pipelines.liquid_model.sensitivity_study import StudyCase
+from pipelines.liquid_model.study_cases import StudyCase
 from sealed_trial.sealing.trial_folder import _written
 from tests.unit.campaigns.dask_cluster import DaskCluster
 from tests.unit.hand_made_trials import truth

@@ -17,7 +17,7 @@ import pipelines.liquid_model.study
 from acquisition.virtual_laboratory.shaker_run import write_virtual_run
 from pipelines.command_line import run
 from pipelines.liquid_model import outputs
-from pipelines.liquid_model.sensitivity_study import StudyCase
+from pipelines.liquid_model.study_cases import StudyCase
 from sloshlab.recording import read_recording
 from sloshlab.reduced_order_model.storage import load_model
 

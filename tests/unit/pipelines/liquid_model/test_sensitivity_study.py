@@ -3,17 +3,8 @@
 import numpy as np
 import pytest
 
-from pipelines.liquid_model.sensitivity_study import (
-    MODEL_NAME,
-    RESULT_NAME,
-    SOURCE_CASES,
-    CaseResult,
-    StudyCase,
-    _Task,
-    picked,
-    sensitivity_study,
-    train_case,
-)
+from pipelines.liquid_model.sensitivity_study import MODEL_NAME, RESULT_NAME, _Task, sensitivity_study, train_case
+from pipelines.liquid_model.study_cases import SOURCE_CASES, CaseResult, StudyCase, picked
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.reduced_order_model.regressors import Run
 from sloshlab.reduced_order_model.storage import load_model
