@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from acquisition.files.channel_map import SourceSection
-from acquisition.files.column_selection import NamedTable, column_grid
+from acquisition.files.column_grid import column_grid
+from acquisition.files.column_lookup import NamedTable
 from acquisition.files.formats import read_table
 from acquisition.files.table import Column
 from sloshlab.errors import InputError

@@ -21,16 +21,10 @@ from acquisition.files.channel_conversion import (
     with_declared,
 )
 from acquisition.files.channel_map import ChannelMap, ChannelSection, read_channel_map
-from acquisition.files.column_selection import (
-    CommonTime,
-    NamedTable,
-    Selected,
-    common_time,
-    found_column,
-    joined_in_time,
-    selected_columns,
-    with_time_column,
-)
+from acquisition.files.column_grid import with_time_column
+from acquisition.files.column_lookup import NamedTable, Selected, found_column
+from acquisition.files.column_selection import joined_in_time, selected_columns
+from acquisition.files.common_time import CommonTime, common_time
 from acquisition.files.delay_compensation import delay_compensated
 from acquisition.files.formats import read_table
 from acquisition.files.report import ImportReport, ImportResult, MappedChannel

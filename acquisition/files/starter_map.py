@@ -18,7 +18,8 @@ from typing import Any, Final
 import numpy as np
 
 from acquisition.files.channel_map import SourceSection
-from acquisition.files.column_selection import NamedTable, column_grid, with_time_column
+from acquisition.files.column_grid import column_grid, with_time_column
+from acquisition.files.column_lookup import NamedTable
 from acquisition.files.formats import file_format, read_table
 from acquisition.files.table import Column, Table
 from sloshlab.configurations import CONFIGURATIONS
