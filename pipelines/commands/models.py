@@ -217,7 +217,8 @@ def simulate(
     as_json: Json = False,
 ) -> None:
     """The twin of a rig file, driven by the motion, the base motion or the release of a recorded run."""
-    from pipelines.twin.simulate import SimulationSettings, simulate_run
+    from pipelines.twin.simulate import simulate_run
+    from pipelines.twin.simulation_settings import SimulationSettings
 
     settings = SimulationSettings(
         rig, run_file, output, block, configuration, twin, save_twin, steps, seed, overwrite

@@ -15,7 +15,8 @@ from pipelines.inputs.rigs import RigLike, rig_source
 from pipelines.interface import html
 from pipelines.interface.drawing import axes_to_draw_on, in_words, legend_below
 from pipelines.report.free_place import require_free_place
-from pipelines.twin.simulate import SimulatedTwin, SimulationSettings, simulated_twin, write_simulation
+from pipelines.twin.simulate import SimulatedTwin, simulated_twin, write_simulation
+from pipelines.twin.simulation_settings import SimulationSettings
 from sloshlab.errors import InputError
 
 if TYPE_CHECKING:

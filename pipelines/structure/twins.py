@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from pipelines.report.progress import progress
-from pipelines.twin.simulate import SimulationSettings, simulate_run
+from pipelines.twin.simulate import simulate_run
+from pipelines.twin.simulation_settings import SimulationSettings
 from sloshlab import atomic_file
 from sloshlab.errors import InputError, RigError
 from sloshlab.recording import read_attributes

@@ -10,26 +10,26 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, cast
 
-import numpy as np
 import xarray as xr
 
-from pipelines.inputs.recordings import RunSource, recording_of
-from pipelines.inputs.rigs import RigSource, folder_of, rig_of
+from pipelines.inputs.recordings import recording_of
+from pipelines.inputs.rigs import folder_of, rig_of
 from pipelines.report.free_place import require_free_place
 from pipelines.report.outputs import RESULT_ID, provenance_of, sha256_of, versions
 from pipelines.report.progress import amounts
 from pipelines.twin.comparison_figure import comparison_png
 from pipelines.twin.simulated_tank_model import departure_attributes, with_tank_model
+from pipelines.twin.simulation_settings import SimulationSettings
+from pipelines.twin.simulation_summary import simulation_summary
 from sloshlab import atomic_file
 from sloshlab.configurations import CONFIGURATIONS
 from sloshlab.errors import InputError
 from sloshlab.missing_physics import effects as vocabulary
 from sloshlab.missing_physics.extension import Extension, with_acting
 from sloshlab.missing_physics.saved_effects import saved_effects
-from sloshlab.modal.rig_beam import scale_remarks
 from sloshlab.recording import run_attributes, write_recording
 from sloshlab.reduced_order_model.departures import Departure
-from sloshlab.rig import TANK_MODELS, Rig
+from sloshlab.rig import Rig
 from sloshlab.toml_file import read_toml
 from sloshlab.twin.recorded_run import Block, Drive, drive_of
 from sloshlab.twin.reduced_order_model_domain import departures
@@ -47,46 +47,6 @@ STEPS_PER_PERIOD: Final = 60
 
 _MOST_STEPS = 1000
 """Per sample; a run that needs more is sampled too slowly to drive this twin."""
-_LARGEST_ENERGY_ERROR = 1e-3
-"""Of the energy passed on, before the balance is flagged and more steps are asked for."""
-
-
-@dataclass(frozen=True)
-class SimulationSettings:
-    """What the command is asked to do.
-
-    Attributes
-    ----------
-    rig : Path or RigInMemory
-    run : Path or RecordingInMemory
-    output : Path
-        Where the simulated recording goes.
-    block : str
-        ``all``, ``tank`` or ``structure``.
-    configuration : str
-        Of the liquid, ``sloshing`` being as the rig file describes it.
-    twin : Path, optional
-        A saved twin instead of that of the rig file.
-    save_twin : Path, optional
-        Where the twin that ran is saved.
-    steps : int, optional
-        Integration steps per sample.
-    seed : int
-        Of the noise of the twin's sensors.
-    overwrite : bool
-        Whether files that are there may be replaced.
-    """
-
-    rig: RigSource
-    run: RunSource
-    output: Path
-    block: str = "all"
-    configuration: str = "sloshing"
-    twin: Path | None = None
-    save_twin: Path | None = None
-    steps: int | None = None
-    seed: int = 0
-    overwrite: bool = False
 
 
 def simulate_run(settings: SimulationSettings) -> dict[str, Any]:
@@ -149,7 +109,7 @@ class SimulatedTwin:
 
     def summary(self) -> dict[str, Any]:
         """``lines`` for people, ``flags``, and numbers for machines."""
-        summary = _summary(
+        summary = simulation_summary(
             self.settings,
             self.rig,
             self.recording,
@@ -342,75 +302,3 @@ def _result_id(settings: SimulationSettings, twin: Twin) -> str:
 
 def _encoding(simulated: xr.Dataset) -> dict[str, dict[str, Any]]:
     return {str(name): {"_FillValue": None} for name in ("time", "quality") if name in simulated.variables}
-
-
-def _summary(
-    settings: SimulationSettings,
-    rig: Rig,
-    recording: xr.Dataset,
-    drive: Drive,
-    *,
-    simulation: Simulation,
-    simulated: SimulatedRun,
-    n_steps: int,
-) -> dict[str, Any]:
-    error = simulation.relative_energy_error
-    flags = [*drive.flags, *simulation.remarks]
-    if error > _LARGEST_ENERGY_ERROR:
-        flags.append(f"energy balance closes only to {error:.1e} of the energy passed on: give more --steps")
-    recorded, now = run_attributes(recording).configuration, simulated.recording.attrs["configuration"]
-    lines = [
-        f"simulation: {settings.output} ({simulation.time_s.size} samples, {n_steps} steps each)",
-        f"driven by: {drive.description}",
-        f"forces: {simulated.recording.attrs['simulated_forces']}",
-    ]
-    if simulation.twin.structure is not None:
-        lines.append(f"energy balance: closes to {error:.1e} of the energy passed on")
-    if recorded != now:
-        lines.append(f"the run is recorded {recorded}, the twin is {now}")
-        lines.append(f"to try next: {_to_try(settings, recorded, now)}")
-    if simulated.left_out:
-        lines.append(f"not simulated: {', '.join(simulated.left_out)}")
-    if rig.structure is not None and rig.structure.kind == "beam":
-        lines += [f"rig: {remark}" for remark in scale_remarks(rig.structure)]
-    return {
-        "lines": lines,
-        "flags": flags,
-        "output": str(settings.output),
-        "samples": int(simulation.time_s.size),
-        "steps_per_sample": n_steps,
-        "driven_by": list(drive.channels),
-        "initial_displacement_m": drive.initial_displacement_m,
-        "channels": sorted(str(name) for name in simulated.recording.data_vars),
-        "left_out": list(simulated.left_out),
-        "events": simulation.n_events,
-        "relative_energy_error": error,
-        "rms": _rms(recording, simulated.recording),
-    }
-
-
-def _to_try(settings: SimulationSettings, recorded: str, now: str) -> str:
-    """What makes twin and run alike, where they are not."""
-    if settings.configuration != "sloshing":
-        return f"leave --configuration {settings.configuration} out, or drive the twin with a run recorded {now}"
-    if recorded != "sloshing":
-        return f"--configuration {recorded}, or a run recorded sloshing"
-    moving = ", ".join(name for name in TANK_MODELS.names if name != "frozen")
-    return (
-        f"a liquid that moves: tank_model = one of {moving} under [twin] of {settings.rig.name}; or `sloshlab "
-        "diagnose` on a case of such runs, which finds what the frozen liquid lacks"
-    )
-
-
-def _rms(recording: xr.Dataset, simulated: xr.Dataset) -> dict[str, dict[str, float]]:
-    """Root mean squares of what was recorded, what was simulated, and their difference, per channel."""
-    compared = {}
-    for name in simulated.data_vars:
-        if name not in recording.data_vars or name == "quality":
-            continue
-        was, now = recording[name].values.astype(float), simulated[name].values
-        both = np.isfinite(was) & np.isfinite(now)
-        if both.any():
-            values = {"recorded": was[both], "simulated": now[both], "difference": now[both] - was[both]}
-            compared[str(name)] = {key: float(np.sqrt(np.mean(each**2))) for key, each in values.items()}
-    return compared
