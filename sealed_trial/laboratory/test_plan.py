@@ -103,59 +103,73 @@ def drawn_plan(name: str, rig: HiddenRig, generator: np.random.Generator) -> Tes
     """Runs of a plan for a rig; levels vary, but nothing depends on what is hidden."""
     kind = name.partition("_")[0]
     first_hz = _first_frequency_hz(rig)
+    rate_hz, deflections_m, level_g = _drawn_levels(kind, generator)
+    if name == SHORT_DECAYS:
+        rate_hz = 256.0
+    if kind == "shaker":
+        runs = _shaker_runs(name, level_g, generator)
+    else:
+        runs = _structure_runs(name, first_hz, deflections_m, level_g)
+    return TestPlan(name, kind, rate_hz, tuple(runs))
+
+
+def _drawn_levels(kind: str, generator: np.random.Generator) -> tuple[float, list[float], float]:
+    """Sampling rate, deflections and acceleration [g] of a rig of a kind."""
     uniform = generator.uniform
     if kind == "sdof":
-        rate = 512.0
         deflections = [
             float(np.round(v, 3)) for v in (uniform(0.045, 0.065), uniform(0.02, 0.03), uniform(0.008, 0.012))
         ]
-        level = float(f"{uniform(0.04, 0.06):.2g}")
-    elif kind == "beam":
-        rate = 1024.0
+        return 512.0, deflections, float(f"{uniform(0.04, 0.06):.2g}")
+    if kind == "beam":
         deflections = [
             -float(np.round(v, 4)) for v in (uniform(0.012, 0.016), uniform(0.006, 0.008), uniform(0.003, 0.004))
         ]
-        level = float(f"{uniform(0.15, 0.25):.2g}")
-    else:
-        rate, deflections, level = 512.0, [], float(f"{uniform(2.0, 4.0):.2g}")
-    free = [RunPlan("free", k, d, duration_s=8.0 if kind == "sdof" else 6.0) for k, d in enumerate(deflections)]
+        return 1024.0, deflections, float(f"{uniform(0.15, 0.25):.2g}")
+    return 512.0, [], float(f"{uniform(2.0, 4.0):.2g}")
+
+
+def _structure_runs(name: str, first_hz: float, deflections_m: list[float], level_g: float) -> list[RunPlan]:
+    """Free decays, random and stepped motion of the base."""
+    duration_s = 8.0 if name.startswith("sdof") else 6.0
+    free = [RunPlan("free", k, d, duration_s=duration_s) for k, d in enumerate(deflections_m)]
     band = (first_hz, 0.45 * first_hz)
-    random = [RunPlan("random", 10 + k, float(f"{level * s:.2g}"), 1, band) for k, s in enumerate((1.0, 0.5, 0.2))]
+    random = [
+        RunPlan("random", 10 + k, float(f"{level_g * s:.2g}"), 1, band) for k, s in enumerate((1.0, 0.5, 0.2))
+    ]
     steps = tuple(float(f"{first_hz * r:.3g}") for r in (0.6, 0.85, 1.3, 1.9, 3.0))
-    stepped = RunPlan("stepped", 20, float(f"{4 * level:.2g}"), 1, steps, (1.0,) * 5, 10.0)
+    stepped = RunPlan("stepped", 20, float(f"{4 * level_g:.2g}"), 1, steps, (1.0,) * 5, 10.0)
     if name == SHORT_DECAYS:
-        rate = 256.0
         short = [replace(run, duration_s=5.0) for run in free]
-        runs = [short[0], _again(short[0], 2), short[1], short[2]]
-    elif name.endswith("decays"):
-        runs = [free[0], _again(free[0], 2), free[1], _again(free[1], 2), free[2]]
-    elif name in ("sdof_base", "beam_base"):
-        runs = [random[0], _again(random[0], 2), random[1], random[2], stepped]
-    elif name == "sdof_mixed" or name == "beam_mixed":
-        runs = [free[0], _again(free[0], 2), free[2], random[0], _again(random[0], 2), stepped]
-    elif name == "sdof_one_frequency":
-        stepped = RunPlan(
-            "stepped", 30, float(f"{3 * level:.2g}"), 1, (float(f"{0.9 * first_hz:.3g}"),), (1.0,), 10.0
-        )
-        runs = [stepped, _again(stepped, 2), _again(stepped, 3)]
-    elif name == "shaker_sweeps":
+        return [short[0], _again(short[0], 2), short[1], short[2]]
+    if name.endswith("decays"):
+        return [free[0], _again(free[0], 2), free[1], _again(free[1], 2), free[2]]
+    if name.endswith("base"):
+        return [random[0], _again(random[0], 2), random[1], random[2], stepped]
+    if name.endswith("mixed"):
+        return [free[0], _again(free[0], 2), free[2], random[0], _again(random[0], 2), stepped]
+    one_frequency = (float(f"{0.9 * first_hz:.3g}"),)
+    steady = RunPlan("stepped", 30, float(f"{3 * level_g:.2g}"), 1, one_frequency, (1.0,), 10.0)
+    return [steady, _again(steady, 2), _again(steady, 3)]
+
+
+def _shaker_runs(name: str, level_g: float, generator: np.random.Generator) -> list[RunPlan]:
+    """Sweeps, stepped tones, and one that wanders."""
+    wander = RunPlan("wandering", 50, level_g, 1, (6.0, 15.0), (), 10.0)
+    if name == "shaker_sweeps":
         sweeps = [
-            RunPlan("swept", 40 + k, float(f"{level * s:.2g}"), 1, (5.0, 18.0), (), 10.0)
+            RunPlan("swept", 40 + k, float(f"{level_g * s:.2g}"), 1, (5.0, 18.0), (), 10.0)
             for k, s in enumerate((1.0, 0.5, 0.2))
         ]
-        wander = RunPlan("wandering", 50, level, 1, (6.0, 15.0), (), 10.0)
-        runs = [sweeps[0], _again(sweeps[0], 2), sweeps[1], sweeps[2], wander]
-    elif name == "shaker_stepped":
-        both = RunPlan("stepped", 60, level, 1, (7.0, 9.0, 12.0, 15.0, 12.0), (1.0, 0.7, 1.0, 0.5, 0.25), 10.0)
-        lower = replace(both, test=61, level=float(f"{0.4 * level:.2g}"))
-        wander = RunPlan("wandering", 50, level, 1, (6.0, 15.0), (), 10.0)
-        runs = [both, _again(both, 2), lower, _again(lower, 2), wander]
-    else:
-        frequency = float(f"{uniform(8.0, 13.0):.3g}")
-        stepped = RunPlan("stepped", 70, level, 1, (frequency,), (1.0,), 8.0)
-        lower = replace(stepped, test=71, level=float(f"{0.4 * level:.2g}"))
-        runs = [stepped, _again(stepped, 2), lower, _again(lower, 2)]
-    return TestPlan(name, kind, rate, tuple(runs))
+        return [sweeps[0], _again(sweeps[0], 2), sweeps[1], sweeps[2], wander]
+    if name == "shaker_stepped":
+        both = RunPlan("stepped", 60, level_g, 1, (7.0, 9.0, 12.0, 15.0, 12.0), (1.0, 0.7, 1.0, 0.5, 0.25), 10.0)
+        lower = replace(both, test=61, level=float(f"{0.4 * level_g:.2g}"))
+        return [both, _again(both, 2), lower, _again(lower, 2), wander]
+    frequency_hz = float(f"{generator.uniform(8.0, 13.0):.3g}")
+    steady = RunPlan("stepped", 70, level_g, 1, (frequency_hz,), (1.0,), 8.0)
+    lower = replace(steady, test=71, level=float(f"{0.4 * level_g:.2g}"))
+    return [steady, _again(steady, 2), lower, _again(lower, 2)]
 
 
 def _again(run: RunPlan, repeat: int) -> RunPlan:
