@@ -163,25 +163,16 @@ def _converted_channel(selected: Selected, section: ChannelSection, first: int, 
     values = _placed(in_si, selected, first, time.n_points, np.nan)
     compensated_s = section.delay_s if section.delay == "compensate" else 0.0
     if compensated_s:
-        n_before = int(np.isnan(values).sum())
-        values = delay_compensated(values, compensated_s * time.rate_hz)
-        n_more = int(np.isnan(values).sum()) - n_before
-        # flags belong to whole samples
-        clipped = _moved(clipped, round(compensated_s * time.rate_hz))
-        traps.append(
-            f"{selected.channel}: compensating its delay costs {n_more} samples at ends and gaps; they are lost"
-        )
-        if np.isnan(values).all():
-            raise RecordingError(
-                f"channels.{selected.channel}.delay_s", got=f"{compensated_s} s", allowed="less than the recording"
-            )
+        values, clipped, trap = _compensated(selected.channel, values, clipped, compensated_s, time.rate_hz)
+        traps.append(trap)
+    attributes = channel_attributes(selected.channel, section, column, scaling)
     mapped = MappedChannel(
         channel=selected.channel,
         source=selected.source,
         column=column.name,
         units_in_file=column.units,
         units_read=scaling.units_read,
-        units=channel_attributes(selected.channel, section, column, scaling)["units"],
+        units=attributes["units"],
         factor=scaling.factor,
         offset=scaling.offset,
         sign=section.sign,
@@ -196,11 +187,25 @@ def _converted_channel(selected: Selected, section: ChannelSection, first: int, 
         selected.channel,
         values,
         clipped,
-        channel_attributes(selected.channel, section, column, scaling),
+        attributes,
         mapped,
         _raw_encoding(column, scaling, values, compensated_s),
         tuple(traps),
     )
+
+
+def _compensated(
+    channel: str, values: FloatArray, clipped: NDArray[np.bool_], delay_s: float, rate_hz: float
+) -> tuple[FloatArray, NDArray[np.bool_], str]:
+    """Values and flags without a delay, and what that costs."""
+    n_before = int(np.isnan(values).sum())
+    values = delay_compensated(values, delay_s * rate_hz)
+    n_more = int(np.isnan(values).sum()) - n_before
+    if np.isnan(values).all():
+        raise RecordingError(f"channels.{channel}.delay_s", got=f"{delay_s} s", allowed="less than the recording")
+    trap = f"{channel}: compensating its delay costs {n_more} samples at ends and gaps; they are lost"
+    # flags belong to whole samples
+    return values, _moved(clipped, round(delay_s * rate_hz)), trap
 
 
 def _moved(flags: NDArray[np.bool_], n_steps: int) -> NDArray[np.bool_]:

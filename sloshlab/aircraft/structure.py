@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
@@ -301,38 +301,12 @@ def _structure(source: Any) -> AircraftStructure:
         raise ValueError(f"format {source.sloshlab_aircraft_structure}")
     held = {name: np.array(variable.data) for name, variable in source.variables.items()}
 
-    def rows(name: str) -> list[list[Any]]:
-        if name not in held:
-            return []
-        cuts = np.cumsum(held[f"n_{name}"])
-        if cuts[-1] != held[name].size or held[f"n_{name}"].min() < 0:
-            raise ValueError(name)
-        return [part.tolist() for part in np.split(held[name], cuts[:-1])]
-
     def floats(name: str) -> FloatArray:
         return np.asarray(held[name], dtype=np.float64)
 
     def number(name: str) -> float | None:
         return float(held[name][0]) if name in held else None
 
-    panels = [
-        Panel(
-            int(number), _three(held["panel_first"][n]), _three(held["panel_second"][n]),
-            float(held["panel_chord"][n][0]), float(held["panel_chord"][n][1]), tuple(along), tuple(across),
-        )
-        for n, (number, along, across) in enumerate(
-            zip(held.get("panel_number", ()), rows("panel_spanwise"), rows("panel_chordwise"), strict=True)
-        )
-    ]  # fmt: skip
-    splines = [
-        SurfaceSpline(
-            int(number), int(held["spline_panel"][n]), tuple(boxes), tuple(nodes),
-            "TPS" if held["spline_is_thin_plate"][n] else "IPS",
-        )
-        for n, (number, boxes, nodes) in enumerate(
-            zip(held.get("spline_number", ()), rows("spline_boxes"), rows("spline_nodes"), strict=True)
-        )
-    ]  # fmt: skip
     facts = {
         name.removeprefix("fact_"): value.decode("utf-8")
         for name, value in source._attributes.items()
@@ -347,12 +321,48 @@ def _structure(source: Any) -> AircraftStructure:
         mass_centre_m=floats("mass_centre"),
         rigid_mass=floats("rigid_mass"),
         is_free=bool(held["is_free"][0]),
-        panels=tuple(panels),
-        splines=tuple(splines),
+        panels=_panels(held),
+        splines=_splines(held),
         reference_chord_m=number("reference_chord"),
         density_kg_per_m3=number("density"),
         facts=facts,
     )
+
+
+def _panels(held: Mapping[str, Any]) -> tuple[Panel, ...]:
+    rows = zip(
+        held.get("panel_number", ()), _rows(held, "panel_spanwise"), _rows(held, "panel_chordwise"), strict=True
+    )
+    return tuple(
+        Panel(
+            int(number), _three(held["panel_first"][n]), _three(held["panel_second"][n]),
+            float(held["panel_chord"][n][0]), float(held["panel_chord"][n][1]), tuple(along), tuple(across),
+        )
+        for n, (number, along, across) in enumerate(rows)
+    )  # fmt: skip
+
+
+def _splines(held: Mapping[str, Any]) -> tuple[SurfaceSpline, ...]:
+    rows = zip(
+        held.get("spline_number", ()), _rows(held, "spline_boxes"), _rows(held, "spline_nodes"), strict=True
+    )
+    return tuple(
+        SurfaceSpline(
+            int(number), int(held["spline_panel"][n]), tuple(boxes), tuple(nodes),
+            "TPS" if held["spline_is_thin_plate"][n] else "IPS",
+        )
+        for n, (number, boxes, nodes) in enumerate(rows)
+    )  # fmt: skip
+
+
+def _rows(held: Mapping[str, Any], name: str) -> list[list[Any]]:
+    """Lists of different lengths that are stored one behind the other."""
+    if name not in held:
+        return []
+    cuts = np.cumsum(held[f"n_{name}"])
+    if cuts[-1] != held[name].size or held[f"n_{name}"].min() < 0:
+        raise ValueError(name)
+    return [part.tolist() for part in np.split(held[name], cuts[:-1])]
 
 
 def _three(values: npt.NDArray[Any]) -> tuple[float, float, float]:
