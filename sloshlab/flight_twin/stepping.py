@@ -230,6 +230,13 @@ def _times(matrix, vector, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _copy(source, target):  # type: ignore[no-untyped-def]
+    """One by one: to give an array to a slice, numba compiles an error message for seconds."""
+    for i in range(source.size):
+        target[i] = source[i]
+
+
+@njit(cache=True)
 def _linear(phi, driven):  # type: ignore[no-untyped-def]
     states = np.zeros((driven.shape[0] + 1, driven.shape[1]))
     for i in range(driven.shape[0]):
@@ -298,17 +305,17 @@ def _with_forces(  # type: ignore[no-untyped-def]
     # exact for a constant: envelopes follow |ü| and |u̇| with one time constant
     share = 1.0 - np.exp(-step / numbers[4])
     for i in range(n_steps - 1):
-        up[:] = of_inputs[i]
+        _copy(of_inputs[i], up)
         _times(of_states, states[i], up)
         _times(of_forces, ahead, up)
         _forces(states[i], up, forces[i], inputs[i], angle_rows, angle_inputs, lift_rows, tank_rows, tip, sloshing,
                 loss, numbers, envelopes, i * step)  # fmt: skip
-        known[:] = driven[i]
+        _copy(driven[i], known)
         _times(phi, states[i], known)
         _times(force0, forces[i], known)
-        predicted[:] = known
+        _copy(known, predicted)
         _times(force1, forces[i], predicted)
-        up[:] = of_inputs[i + 1]
+        _copy(of_inputs[i + 1], up)
         _times(of_states, predicted, up)
         _times(of_forces, forces[i], up)
         for k in range(n_tanks):
@@ -319,10 +326,10 @@ def _with_forces(  # type: ignore[no-untyped-def]
             envelopes[k, 1] += share * (0.5 * np.pi * abs(speed) - envelopes[k, 1])
         _forces(predicted, up, ahead, inputs[i + 1], angle_rows, angle_inputs, lift_rows, tank_rows, tip, sloshing,
                 loss, numbers, envelopes, (i + 1) * step)  # fmt: skip
-        states[i + 1] = known
+        _copy(known, states[i + 1])
         _times(force1, ahead, states[i + 1])
         if not abs(states[i + 1, 0]) < _DIVERGED:
             states[i + 1 :] = np.nan
             break
-    forces[-1] = ahead
+    _copy(ahead, forces[-1])
     return states, forces

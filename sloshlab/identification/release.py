@@ -116,8 +116,9 @@ def _interpolated(values: FloatArray, samples: float, averaging: float) -> Float
                 weights[k] *= (share + _N_POINTS // 2 - 1 - other) / (k - other)
     n, before = values.size, _N_POINTS // 2 + abs(whole)
     padded = np.empty(n + 2 * before)
-    padded[:before], padded[before + n :] = values[0], values[-1]
-    padded[before : before + n] = values
+    # one by one: to give an array to a slice, numba compiles an error message for seconds
+    for i in range(padded.size):
+        padded[i] = values[min(max(i - before, 0), n - 1)]
     for i in range(1, n - 1):
         padded[before + i] += 0.5 * averaging * (values[i - 1] - 2.0 * values[i] + values[i + 1])
     sums, first = np.zeros(n), before - whole - _N_POINTS // 2

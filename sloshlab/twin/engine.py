@@ -17,8 +17,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from sloshlab.twin.compiled import called, entry, inlined
 from sloshlab.twin.law import N_MOTION, VELOCITY
 from sloshlab.twin.law_call import call_law
 from sloshlab.twin.model import NO_FRICTION, STICKS, Excited, FloatArray, Model, Outputs, Scratch, Stretch, Time
@@ -45,20 +45,20 @@ class _PastEvent(NamedTuple):
     margin: float  # smallest event function at its end, negative
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _copy(source: FloatArray, target: FloatArray) -> None:
     for j in range(source.size):
         target[j] = source[j]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _events(m: Model, i: int, y: FloatArray, s: Scratch) -> None:
     # `s.motion` must belong to `y`: event functions are asked right after the rates of the same state
     motion, at = m.frame[i] * N_MOTION, m.memory_at[i]
     call_law(m.events[i], (s.motion, m.parameters, y, s.values), (motion, m.parameters_at[i], at, 0))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def margin(m: Model, y: FloatArray, s: Scratch) -> float:
     """Smallest of all event functions, each positive while its switch holds."""
     smallest = np.inf
@@ -81,7 +81,7 @@ def margin(m: Model, y: FloatArray, s: Scratch) -> float:
     return smallest
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+@called
 def _to_event(m: Model, excited: Excited, start: Time, past: _PastEvent, s: Scratch) -> float:
     """Share of the whole step after which the first event has just come; `trial` is the state there."""
     step = past.step_s
@@ -113,7 +113,7 @@ def _to_event(m: Model, excited: Excited, start: Time, past: _PastEvent, s: Scra
     return high
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+@called
 def _switch(m: Model, excited: Excited, now: Time, s: Scratch, out: Outputs) -> int:
     """Turn every switch whose event has come; returns the term that met its limit, or −1."""
     for i in range(m.law.size):
@@ -140,7 +140,7 @@ def _switch(m: Model, excited: Excited, now: Time, s: Scratch, out: Outputs) -> 
     return -1
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _log(out: Outputs, now: Time, term: int, event: int, value: float) -> None:
     log, n = out.log, out.n_events[0]
     if n < log.shape[0]:
@@ -149,7 +149,7 @@ def _log(out: Outputs, now: Time, term: int, event: int, value: float) -> None:
     out.n_events[0] = n + 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _record(m: Model, row: int, s: Scratch, out: Outputs) -> None:
     """The present state as a row of the outputs; the rates there are in the first slopes."""
     n, y = m.stiffness.size, s.state
@@ -167,7 +167,7 @@ def _record(m: Model, row: int, s: Scratch, out: Outputs) -> None:
         out.rows[row, works + j] = s.works[j]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _fault_of(y: FloatArray, largest: FloatArray) -> int:
     """Index of the first state that is no number or beyond its bound, or −1."""
     for j in range(y.size):
@@ -177,7 +177,7 @@ def _fault_of(y: FloatArray, largest: FloatArray) -> int:
     return -1
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+@entry
 def begin(m: Model, excited: Excited, s: Scratch) -> int:
     """Set the switches and the friction of the start; the term that is beyond its limit, or −1."""
     start = Time(0.0, 0.0)
@@ -205,7 +205,7 @@ def begin(m: Model, excited: Excited, s: Scratch) -> int:
     return -1
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+@called
 def _update(m: Model, excited: Excited, now: Time, s: Scratch) -> None:
     """Let models in discrete time that follow the output take their step."""
     updated = False
@@ -217,13 +217,13 @@ def _update(m: Model, excited: Excited, now: Time, s: Scratch) -> None:
         rates_by_call(m, excited, now, s)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+@called
 def _update_term(m: Model, i: int, s: Scratch) -> None:
     motion, at = m.frame[i] * N_MOTION, m.memory_at[i]
     call_law(m.update[i], (s.motion, m.parameters, s.state, s.slopes[4]), (motion, m.parameters_at[i], at, at))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+@called
 def _update_due(m: Model, excited: Excited, now: Time, tolerance_s: float, s: Scratch) -> None:
     """Let models in discrete time whose own instant this is take their step."""
     updated = False
@@ -236,7 +236,7 @@ def _update_due(m: Model, excited: Excited, now: Time, tolerance_s: float, s: Sc
         rates_by_call(m, excited, now, s)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+@called
 def next_update(m: Model, s: Scratch) -> float:
     """When [s] a model in discrete time takes its next step; infinite without any."""
     due = np.inf
@@ -246,7 +246,7 @@ def next_update(m: Model, s: Scratch) -> float:
     return due
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def take_step(
     m: Model, excited: Excited, s: Scratch, stretch: Stretch, out: Outputs, index: int, due: float
 ) -> tuple[int, int, float]:
@@ -291,7 +291,7 @@ def take_step(
     return DONE, -1, due
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def end_row(m: Model, excited: Excited, s: Scratch, stretch: Stretch, row: int) -> int:
     """Updates of models that follow the output; the state that is beyond its bound after them, or −1."""
     if m.updates:
@@ -300,7 +300,7 @@ def end_row(m: Model, excited: Excited, s: Scratch, stretch: Stretch, row: int) 
     return _fault_of(s.state, stretch.largest)  # type: ignore[no-any-return]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+@entry
 def integrate(m: Model, excited: Excited, s: Scratch, stretch: Stretch, out: Outputs) -> tuple[int, int, int]:
     """Integrate on and fill the rows of a stretch.
 
@@ -325,7 +325,7 @@ def integrate(m: Model, excited: Excited, s: Scratch, stretch: Stretch, out: Out
     return DONE, stretch.last_row, -1
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _accept(s: Scratch) -> None:
     """The trial step becomes the state, its last rates the first ones of the next step."""
     _copy(s.trial, s.state)

@@ -221,7 +221,10 @@ class _Pack:
                 engine.begin_lanes(self.twins, drives, side_by_side, scratches, ends, series)
             stretch = Stretch(first_row, last_row, self.n_substeps, step, largest)
             if self.steps_together:
-                engine.integrate_together(self.twins, drives, side_by_side, scratches, stretch, ends, series)
+                by_itself = engine.address_of_step(self.twins, drives, scratches, stretch, ends)
+                engine.integrate_together(
+                    self.twins, drives, side_by_side, scratches, stretch, ends, series, by_itself
+                )
             else:
                 engine.integrate_in_turn(self.twins, drives, scratches, stretch, ends, series)
             del tables  # kept up to here, as the loop has only their addresses

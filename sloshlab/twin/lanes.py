@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from sloshlab.twin.compiled import address_of, called, entry, inlined
 from sloshlab.twin.engine import DONE, FAULT, SWITCH_TOLERANCE, UNSTABLE, begin, end_row, next_update, take_step
 from sloshlab.twin.lane_vector import N_LANES, alike, call_law_together, numbers_of, put, table_at
 from sloshlab.twin.law import (
@@ -27,7 +27,7 @@ from sloshlab.twin.law import (
     TIME,
     VELOCITY,
 )
-from sloshlab.twin.law_call import call_law
+from sloshlab.twin.law_call import call_law, call_step
 from sloshlab.twin.model import (
     ABSOLUTE,
     DRY_FRICTION,
@@ -144,7 +144,7 @@ class LaneEnds(NamedTuple):
     out: Outputs  # of the engine for one twin, with room for nothing
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _model(lanes: Lanes, lane: int) -> Model:
     of = lanes.of_first
     return Model(
@@ -156,7 +156,7 @@ def _model(lanes: Lanes, lane: int) -> Model:
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _scratch(s: LaneScratch, lane: int) -> Scratch:
     return Scratch(
         s.state[lane], s.nothing, s.updates[lane], s.friction[lane], s.motion[lane], s.force[lane],
@@ -165,13 +165,21 @@ def _scratch(s: LaneScratch, lane: int) -> Scratch:
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _excited(drives: Drives, lane: int) -> Excited:
     table = table_at(drives.tables[lane], drives.n_rows, _N_INPUTS)
     return Excited(table, drives.first, drives.factor[lane])
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+def address_of_step(lanes: Lanes, drives: Drives, s: LaneScratch, stretch: Stretch, ends: LaneEnds) -> int:
+    """Where `take_step` is for lanes like these, for `integrate_together`."""
+    excited = Excited(np.empty((0, _N_INPUTS)), drives.first, drives.factor[0])
+    # what compiled code makes of a lane, so that the types are the same there
+    m, own = _model.py_func(lanes, 0), _scratch.py_func(s, 0)  # type: ignore[attr-defined]
+    return address_of(take_step, m, excited, own, stretch, ends.out, 0, np.inf)
+
+
+@inlined
 def _read_inputs(lanes: Lanes, drives: Drives, row: int, b: SideBySide) -> None:
     if drives.n_rows == 0:
         return
@@ -189,7 +197,7 @@ def _read_inputs(lanes: Lanes, drives: Drives, row: int, b: SideBySide) -> None:
             b.inputs[column * N_LANES + lane] = table[row, column] * factor_of
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _set_directions(lanes: Lanes, b: SideBySide, s: LaneScratch) -> bool:
     """Directions of friction within the step; whether any lane sticks."""
     sticks = False
@@ -199,7 +207,7 @@ def _set_directions(lanes: Lanes, b: SideBySide, s: LaneScratch) -> bool:
     return sticks
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _set_motion(lanes: Lanes, seconds: float, stage: int, x: Any, v: Any, b: SideBySide) -> None:
     for frame in range(lanes.first_frame, lanes.last_frame + 1):
         at, share = frame * N_MOTION, alike(float(frame))
@@ -216,13 +224,13 @@ def _set_motion(lanes: Lanes, seconds: float, stage: int, x: Any, v: Any, b: Sid
         put(b.motion, at + DIRECTION, numbers_of(b.direction, 0))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _take_motion(lanes: Lanes, lane: int, b: SideBySide, s: LaneScratch) -> None:
     for k in range(lanes.first_frame * N_MOTION, (lanes.last_frame + 1) * N_MOTION):
         s.motion[lane, k] = b.motion[k * N_LANES + lane]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _add_forces(
     lanes: Lanes, at: tuple[int, float, int, bool], total: Any, b: SideBySide, s: LaneScratch, ends: LaneEnds
 ) -> Any:
@@ -262,7 +270,7 @@ def _add_forces(
     return total
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+@called
 def _solve_lane(lanes: Lanes, lane: int, stage: int, b: SideBySide, s: LaneScratch, ends: LaneEnds) -> None:
     """Sum of the forces of a lane where some depend on the acceleration, by the engine for one twin."""
     m, own = _model(lanes, lane), _scratch(s, lane)
@@ -279,7 +287,7 @@ def _solve_lane(lanes: Lanes, lane: int, stage: int, b: SideBySide, s: LaneScrat
         ends.unsolved[lane] = 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _force(lanes: Lanes, lane: int, i: int, stage: int, s: LaneScratch) -> float:
     m = lanes.of_first
     at = m.memory_at[i]
@@ -290,7 +298,7 @@ def _force(lanes: Lanes, lane: int, i: int, stage: int, s: LaneScratch) -> float
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _holding_force(lanes: Lanes, lane: int, stage: int, b: SideBySide, s: LaneScratch) -> float:
     """Force of friction that sticks, as `rates` has it; its bounds and shares at the end of the step alone."""
     m, motion = lanes.of_first, s.motion[lane]
@@ -319,7 +327,7 @@ def _holding_force(lanes: Lanes, lane: int, stage: int, b: SideBySide, s: LaneSc
     return holding  # type: ignore[no-any-return]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _rates(
     lanes: Lanes,
     drives: Drives,
@@ -358,7 +366,7 @@ def _rates(
         _add_inertia(lanes, a, a + base, b, s)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _add_inertia(lanes: Lanes, relative: Any, absolute: Any, b: SideBySide, s: LaneScratch) -> None:
     put(b.motion, ACCELERATION, relative)
     put(b.motion, N_MOTION + ACCELERATION, absolute)
@@ -370,7 +378,7 @@ def _add_inertia(lanes: Lanes, relative: Any, absolute: Any, b: SideBySide, s: L
                 s.motion[lane, at] = b.motion[at * N_LANES + lane]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _advance(
     lanes: Lanes, drives: Drives, at: tuple[int, float], b: SideBySide, s: LaneScratch, ends: LaneEnds
 ) -> None:
@@ -404,7 +412,7 @@ def _advance(
         _rates(lanes, drives, (row, start + c * step, stage, sticks), b, s, ends)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _has_event(lanes: Lanes, lane: int, b: SideBySide, s: LaneScratch) -> bool:
     """Whether the step of a lane went past an event: it takes the step alone then."""
     m, friction = lanes.of_first, s.friction[lane]
@@ -431,13 +439,13 @@ def _has_event(lanes: Lanes, lane: int, b: SideBySide, s: LaneScratch) -> bool:
     return False
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _take_out(lanes: Lanes, lane: int, b: SideBySide, s: LaneScratch) -> None:
     for j in range(2 * lanes.n_modes):
         s.state[lane, j], s.slopes[lane, 0, j] = b.state[j * N_LANES + lane], b.slopes[j * N_LANES + lane]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _put_in(lanes: Lanes, lane: int, b: SideBySide, s: LaneScratch) -> None:
     n = 2 * lanes.n_modes
     for j in range(n):
@@ -447,7 +455,7 @@ def _put_in(lanes: Lanes, lane: int, b: SideBySide, s: LaneScratch) -> None:
         b.force[i * N_LANES + lane] = s.force[lane, i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _accept(lanes: Lanes, b: SideBySide, s: LaneScratch, ends: LaneEnds) -> None:
     n = 2 * lanes.n_modes
     for j in range(n):
@@ -459,12 +467,12 @@ def _accept(lanes: Lanes, b: SideBySide, s: LaneScratch, ends: LaneEnds) -> None
                 s.state[lane, j], s.slopes[lane, 0, j] = s.trial[lane, j], s.slopes[lane, 4, j]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _stop(lane: int, status: int, filled: int, where: int, ends: LaneEnds) -> None:
     ends.status[lane], ends.filled[lane], ends.where[lane] = status, filled, where
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _record_alone(lanes: Lanes, lane: int, row: int, s: LaneScratch, series: Series) -> None:
     n = lanes.n_modes
     of_lane = table_at(series.tables[lane], 3 * n + 1, series.n_rows)
@@ -475,7 +483,7 @@ def _record_alone(lanes: Lanes, lane: int, row: int, s: LaneScratch, series: Ser
     of_lane[3 * n, row] = _tank_force(lanes, s.force[lane], 0, 1)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _tank_force(lanes: Lanes, forces: FloatArray, first: int, step: int) -> float:
     total = 0.0
     for i in range(lanes.of_first.law.size):
@@ -484,7 +492,7 @@ def _tank_force(lanes: Lanes, forces: FloatArray, first: int, step: int) -> floa
     return total
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _end_row(
     lanes: Lanes, row: int, stretch: Stretch, b: SideBySide, s: LaneScratch, ends: LaneEnds, series: Series
 ) -> None:
@@ -516,7 +524,7 @@ def _end_row(
         of_lane[3 * n, row] = _tank_force(lanes, b.force, lane, N_LANES)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+@entry
 def integrate_together(
     lanes: Lanes,
     drives: Drives,
@@ -525,8 +533,9 @@ def integrate_together(
     stretch: Stretch,
     ends: LaneEnds,
     series: Series,
+    step_alone: int,
 ) -> None:
-    """Integrate all lanes on, and fill their rows of a stretch."""
+    """Integrate all lanes on, and fill their rows of a stretch; `step_alone` is the address of `take_step`."""
     cares = lanes.of_first.friction_frame >= 0 or lanes.of_first.uses_acceleration
     for i in range(lanes.of_first.law.size):
         cares |= lanes.of_first.events[i] != 0
@@ -544,7 +553,9 @@ def integrate_together(
                         s.slope[lane, 0] = s.slope_before[lane]
                         _take_out(lanes, lane, b, s)
                         m, excited, own = _model(lanes, lane), _excited(drives, lane), _scratch(s, lane)
-                        status, where, _ = take_step(m, excited, own, stretch, ends.out, index, np.inf)
+                        status, where, _ = call_step(
+                            step_alone, (m, excited, own, stretch, ends.out, index, np.inf)
+                        )
                         _put_in(lanes, lane, b, s)
                         if status != DONE:
                             _stop(lane, status, row, where, ends)
@@ -553,7 +564,7 @@ def integrate_together(
         _end_row(lanes, row, stretch, b, s, ends, series)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+@entry
 def begin_lanes(
     lanes: Lanes, drives: Drives, b: SideBySide, s: LaneScratch, ends: LaneEnds, series: Series
 ) -> None:
@@ -568,7 +579,7 @@ def begin_lanes(
             b.state[j * N_LANES + lane], b.slopes[j * N_LANES + lane] = s.state[lane, j], s.slopes[lane, 0, j]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+@entry
 def integrate_in_turn(
     lanes: Lanes, drives: Drives, s: LaneScratch, stretch: Stretch, ends: LaneEnds, series: Series
 ) -> None:

@@ -1,4 +1,4 @@
-"""Calling a law by its address from compiled code."""
+"""Calling by address from compiled code: laws, and a step that is not compiled again where it is hardly taken."""
 
 from __future__ import annotations
 
@@ -27,3 +27,19 @@ def call_law(typing: Any, address: Any, arrays: Any, offsets: Any) -> Any:
         return builder.call(builder.inttoptr(arguments[0], function), pointers)
 
     return signature, code
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def call_step(typing: Any, address: Any, arguments: Any) -> Any:
+    """Call `take_step`, compiled for the types of these arguments, at its `address`; see `address_of`."""
+    # numba optimises what a loop calls once more within the loop, even what it hardly ever calls
+    given, returned = tuple(arguments), types.Tuple((types.int64, types.int64, types.float64))
+
+    def code(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        convention = context.call_conv
+        function = convention.get_function_type(returned, given).as_pointer()
+        callee, unpacked = builder.inttoptr(values[0], function), cgutils.unpack_tuple(builder, values[1])
+        # the engine raises nothing, so that there is no status to be looked at
+        return convention.call_function(builder, callee, returned, given, unpacked)[1]
+
+    return returned(types.int64, types.Tuple(given)), code

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from sloshlab.twin.compiled import called, inlined
 from sloshlab.twin.law import (
     ACCELERATION,
     BASE_ACCELERATION,
@@ -41,7 +41,7 @@ _LEAST_CHORD = 1e-6
 _ACCELERATION_TOLERANCE = 1e-12
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _read_inputs(excited: Excited, position: float, inputs: FloatArray) -> None:
     """Excitation at a position in half steps: the row itself, or a six-point polynomial between rows."""
     # the classical scheme needs the inputs at the ends and in the middle of a step: rows are half steps
@@ -71,13 +71,13 @@ def _read_inputs(excited: Excited, position: float, inputs: FloatArray) -> None:
     _scale(excited.factor, inputs)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _scale(factor: float, inputs: FloatArray) -> None:
     for column in range(N_OF_BASE_MOTION):
         inputs[column] *= factor
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _set_motion(s: Scratch, time: float, x: float, v: float) -> None:
     for frame in range(2):
         at = frame * N_MOTION
@@ -94,7 +94,7 @@ def _set_motion(s: Scratch, time: float, x: float, v: float) -> None:
         s.motion[at + DIRECTION] = s.friction[0]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _force(m: Model, i: int, stage: Stage, s: Scratch) -> float:
     at = m.memory_at[i]
     return call_law(  # type: ignore[no-any-return]
@@ -104,7 +104,7 @@ def _force(m: Model, i: int, stage: Stage, s: Scratch) -> float:
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+@called
 def _forces_at(m: Model, a: float, stage: Stage, s: Scratch) -> float:
     """Sum of the forces that depend on the acceleration, at the relative acceleration a."""
     s.motion[RELATIVE * N_MOTION + ACCELERATION] = a
@@ -117,7 +117,7 @@ def _forces_at(m: Model, a: float, stage: Stage, s: Scratch) -> float:
     return total
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+@called
 def _solve_acceleration(m: Model, mobility: float, free: float, known: float, stage: Stage, s: Scratch) -> float:
     """The relative acceleration under forces that depend on it; NaN if there is none.
 
@@ -159,7 +159,7 @@ def _solve_acceleration(m: Model, mobility: float, free: float, known: float, st
     return np.nan
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+@called
 def _hold(m: Model, holding: float, stage: Stage, s: Scratch) -> None:
     """Bounds of the holding force of sticking friction, and its shares of the friction terms."""
     at = m.friction_frame * N_MOTION
@@ -186,7 +186,7 @@ def _hold(m: Model, holding: float, stage: Stage, s: Scratch) -> None:
     s.friction[1] = holding
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _known_force(m: Model, stage: Stage, s: Scratch) -> float:
     """External force and those terms that depend neither on the acceleration nor on what friction has to hold."""
     later = USES_ACCELERATION | DRY_FRICTION if s.friction[0] == STICKS else USES_ACCELERATION
@@ -201,7 +201,7 @@ def _known_force(m: Model, stage: Stage, s: Scratch) -> float:
     return total  # type: ignore[no-any-return]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+@called
 def implicit_force(
     m: Model, mobility: float, free: float, known: float, stage: Stage, s: Scratch
 ) -> tuple[float, bool]:
@@ -222,14 +222,14 @@ def implicit_force(
     return (inertia * a - free) / mobility, np.isfinite(a)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _ask(e: Equations, force: float, y: FloatArray, s: Scratch) -> None:
     """Rates and readings of equations under a force, into `answer`."""
     s.drive[0] = force
     call_law(e.address, (s.drive, e.numbers, y, s.answer), (0, 0, 0, 0))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+@called
 def _rates_of_equations(m: Model, now: Time, stage: Stage, s: Scratch) -> bool:
     """The rates where somebody's own equations stand in place of modes, in which the added force is linear."""
     e, y = m.equations, stage.state
@@ -262,7 +262,7 @@ def _rates_of_equations(m: Model, now: Time, stage: Stage, s: Scratch) -> bool:
     return good
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def rates(m: Model, excited: Excited, now: Time, stage: Stage, s: Scratch) -> bool:
     """Time derivatives of the state and of the works; forces and motions stay in `s`."""
     n, y, dy = m.stiffness.size, stage.state, stage.rates
@@ -297,7 +297,7 @@ def rates(m: Model, excited: Excited, now: Time, stage: Stage, s: Scratch) -> bo
     return good
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def _set_powers(m: Model, stage: Stage, v: float, s: Scratch) -> None:
     """Power of each term on the modes and in its own frame, then those of `N_OTHER_WORKS`, if works are kept."""
     n, n_terms, base = m.stiffness.size, m.law.size, s.inputs[2]
@@ -320,13 +320,13 @@ def _set_powers(m: Model, stage: Stage, v: float, s: Scratch) -> None:
     power[at], power[at + 1], power[at + 2] = damped, inertia, s.inputs[5] * v
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+@called
 def rates_by_call(m: Model, excited: Excited, now: Time, s: Scratch) -> bool:
     """The rates of the present state, into the first slopes, not compiled into callers that rarely need them."""
     return rates(m, excited, now, Stage(s.state, s.slopes[0], 0), s)  # type: ignore[no-any-return]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)  # type: ignore[untyped-decorator]
+@inlined
 def advance(m: Model, excited: Excited, start: Time, length: Time, s: Scratch) -> bool:
     """One Runge–Kutta step from `state` to `trial`, the rates at its start being in the first slopes."""
     # Rates of the end of the step are taken as a fifth stage: they are the first of the next step and tell the
@@ -351,13 +351,13 @@ def advance(m: Model, excited: Excited, start: Time, length: Time, s: Scratch) -
     return good
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+@called
 def advance_by_call(m: Model, excited: Excited, start: Time, length: Time, s: Scratch) -> bool:
     """The step, not compiled into callers that rarely need it: the call itself costs a third of a step."""
     return advance(m, excited, start, length, s)  # type: ignore[no-any-return]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+@called
 def set_friction(m: Model, excited: Excited, now: Time, s: Scratch) -> None:
     """At rest: stick if the holding force allows, else slide in the direction of the other forces."""
     n = m.stiffness.size
@@ -375,7 +375,7 @@ def set_friction(m: Model, excited: Excited, now: Time, s: Scratch) -> None:
     release_friction(s)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[untyped-decorator]
+@called
 def release_friction(s: Scratch) -> None:
     """Slide where sticking would need more than friction can hold."""
     if s.friction[1] > s.friction[3]:

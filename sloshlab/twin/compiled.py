@@ -1,0 +1,41 @@
+"""How the loops of the twin are compiled: those that Python calls, and what is compiled into them.
+
+Their arguments are tuples of dozens of arrays. Code that takes them from Python and hands errors back is longer
+than most functions are, and takes longer to compile; only an `entry` has it. Calling one of the others from Python
+would end the process: they belong into compiled code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final, TypeVar
+
+from numba import njit, typeof
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+_LOOP: Final = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False}
+_WITHIN: Final = {**_LOOP, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+
+def entry(function: _F) -> _F:
+    """A loop that is called from Python, too."""
+    return njit(**_LOOP)(function)  # type: ignore[no-any-return]
+
+
+def called(function: _F) -> _F:
+    """Called from compiled code alone."""
+    return njit(**_WITHIN)(function)  # type: ignore[no-any-return]
+
+
+def inlined(function: _F) -> _F:
+    """Put into compiled code wherever it is called."""
+    return njit(**_WITHIN, forceinline=True)(function)  # type: ignore[no-any-return]
+
+
+def address_of(function: Callable[..., Any], *arguments: Any) -> int:
+    """Where a `called` or `inlined` function is that was compiled for the types of these arguments."""
+    given = tuple(typeof(argument) for argument in arguments)
+    function.compile(given)  # type: ignore[attr-defined]
+    compiled = function.overloads[given]  # type: ignore[attr-defined]
+    return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
