@@ -157,7 +157,7 @@ def quality_of(recording: xr.Dataset) -> RunQuality:
 
 def channel_quality(channel: xr.DataArray) -> ChannelQuality:
     """Range, mean, RMS, lost and clipped samples of one channel."""
-    n, minimum, maximum, mean, deviation = _statistics(channel.values)
+    n, minimum, maximum, mean, deviation = sample_statistics(channel.values)
     return ChannelQuality(
         name=str(channel.name),
         quantity=str(channel.attrs.get("quantity", "")),
@@ -262,8 +262,8 @@ def _gain_remarks(agreed: SensorAgreement | None) -> list[str]:
     ]
 
 
-def _statistics(values: npt.NDArray[Any]) -> tuple[int, float, float, float, float]:
-    """n, minimum, maximum, mean and standard deviation of the values that are not NaN."""
+def sample_statistics(values: npt.NDArray[Any]) -> tuple[int, float, float, float, float]:
+    """How many values are no NaN; their minimum, maximum, mean and standard deviation, NaN if there are none."""
     n, minimum, maximum, origin, total, squares = _sums(values)
     if n == 0:
         return 0, math.nan, math.nan, math.nan, math.nan

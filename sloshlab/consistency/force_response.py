@@ -29,6 +29,7 @@ _LONGEST_START_CYCLES: Final = 12
 _FEWEST_SAMPLES: Final = 64
 _AT_REST: Final = 0.25
 """A run begins at rest if its first tenth of the start has less than this part of its largest acceleration."""
+_SAMPLES_AT_ONCE: Final = 1 << 16
 _LONGEST_RUN_SAMPLES: Final = 60_000
 """Of a still run; more tells nothing more."""
 
@@ -60,7 +61,7 @@ class ForceResponse:
 
 def start_response(recording: xr.Dataset) -> ForceResponse | None:
     """Response in the quiet start of a run; None if the run does not begin at rest or is quiet for too short."""
-    acceleration = np.asarray(mean_acceleration(recording).values, dtype=np.float64)
+    acceleration = mean_acceleration(recording).values
     stretch = quiet_start(acceleration, sampling_step_s(recording))
     return None if stretch is None else _response(recording, acceleration, stretch)
 
@@ -70,14 +71,16 @@ def stop_response(recording: xr.Dataset) -> ForceResponse | None:
 
     The liquid still moves then, by itself: what it gives and takes is bounded, not absent.
     """
-    acceleration = np.asarray(mean_acceleration(recording).values, dtype=np.float64)
+    acceleration = mean_acceleration(recording).values
     there = np.isfinite(acceleration)
-    moved = np.where(there, acceleration - np.nanmean(acceleration), 0.0) if there.any() else acceleration
-    strong = np.flatnonzero(np.abs(moved) > _LIFT_OFF * GRAVITY_M_PER_S2)
-    if strong.size == 0:
+    if not there.any():
         return None
-    stretch = slice(int(strong[-1]) + 1, moved.size)
-    left = np.abs(moved[stretch])
+    mean = _mean(acceleration, there)
+    n_after = _n_weak(acceleration[::-1], mean)
+    if n_after == acceleration.size:
+        return None
+    stretch = slice(acceleration.size - n_after, acceleration.size)
+    left = np.abs(_moved(acceleration[stretch], mean))
     if left.size < _FEWEST_SAMPLES or left[-max(left.size // 10, 4) :].max() > _AT_REST * left.max():
         return None
     return _response(recording, acceleration, stretch)
@@ -85,11 +88,11 @@ def stop_response(recording: xr.Dataset) -> ForceResponse | None:
 
 def still_response(recording: xr.Dataset) -> ForceResponse | None:
     """Response of a run without liquid motion, of its first 60 000 samples at most."""
-    acceleration = np.asarray(mean_acceleration(recording).values, dtype=np.float64)
+    acceleration = mean_acceleration(recording).values
     return _response(recording, acceleration, slice(0, min(acceleration.size, _LONGEST_RUN_SAMPLES)))
 
 
-def quiet_start(acceleration: FloatArray, step_s: float) -> slice | None:
+def quiet_start(acceleration: npt.NDArray[np.floating], step_s: float) -> slice | None:
     """Samples from the beginning until the liquid may have begun to move; None where it may have moved before.
 
     Parameters
@@ -102,10 +105,9 @@ def quiet_start(acceleration: FloatArray, step_s: float) -> slice | None:
     there = np.isfinite(acceleration)
     if there.sum() < _FEWEST_SAMPLES:
         return None
-    moved = np.where(there, acceleration - np.nanmean(acceleration), 0.0)
-    lifted = np.flatnonzero(np.abs(moved) > _LIFT_OFF * GRAVITY_M_PER_S2)
-    stop = int(lifted[0]) if lifted.size else moved.size
-    stop = min(stop, _cycles_end(moved[:stop]))
+    mean = _mean(acceleration, there)
+    moved = _moved(acceleration[: _n_weak(acceleration, mean)], mean)
+    stop = _cycles_end(moved)
     if stop < _FEWEST_SAMPLES:
         return None
     largest = float(np.abs(moved[:stop]).max())
@@ -114,6 +116,28 @@ def quiet_start(acceleration: FloatArray, step_s: float) -> slice | None:
     if largest == 0 or beginning > _AT_REST * largest:
         return None
     return slice(0, stop)
+
+
+def _mean(acceleration: npt.NDArray[np.floating], there: npt.NDArray[np.bool_]) -> np.float64:
+    """Mean of the samples that are there, of which there is one at least."""
+    everything = bool(there.all())
+    return np.float64(np.mean(acceleration if everything else acceleration[there], dtype=np.float64))
+
+
+def _moved(acceleration: npt.NDArray[np.floating], mean: np.float64) -> FloatArray:
+    """Acceleration about the mean in double precision, zero where lost."""
+    return np.where(np.isfinite(acceleration), acceleration - mean, 0.0)
+
+
+def _n_weak(acceleration: npt.NDArray[np.floating], mean: np.float64) -> int:
+    """Samples before the first at which the liquid may leave the floor."""
+    # in blocks: most runs lift the liquid early, and what comes after is not looked at
+    for start in range(0, acceleration.size, _SAMPLES_AT_ONCE):
+        block = _moved(acceleration[start : start + _SAMPLES_AT_ONCE], mean)
+        strong = np.flatnonzero(np.abs(block) > _LIFT_OFF * GRAVITY_M_PER_S2)
+        if strong.size:
+            return start + int(strong[0])
+    return acceleration.size
 
 
 def _cycles_end(moved: FloatArray) -> int:
@@ -134,10 +158,12 @@ def _cycles_end(moved: FloatArray) -> int:
     return int(cycles[_LONGEST_START_CYCLES]) if cycles.size > _LONGEST_START_CYCLES else moved.size
 
 
-def _response(recording: xr.Dataset, acceleration: FloatArray, stretch: slice) -> ForceResponse | None:
+def _response(
+    recording: xr.Dataset, acceleration: npt.NDArray[np.floating], stretch: slice
+) -> ForceResponse | None:
     step_s = sampling_step_s(recording)
-    force = np.asarray(total_force(recording).values[stretch], dtype=np.float64)
-    motion = acceleration[stretch]
+    force = np.asarray(total_force(recording.isel(time=stretch)).values, dtype=np.float64)
+    motion = np.asarray(acceleration[stretch], dtype=np.float64)
     jerk = np.gradient(motion, step_s)
     there = np.isfinite(force + motion + jerk)
     if there.sum() < _FEWEST_SAMPLES:
@@ -169,7 +195,7 @@ def _response(recording: xr.Dataset, acceleration: FloatArray, stretch: slice) -
     )
 
 
-def _wave_columns(acceleration: FloatArray, stretch: slice) -> FloatArray:
+def _wave_columns(acceleration: npt.NDArray[np.floating], stretch: slice) -> FloatArray:
     """Waves at half and three halves of the frequency of the motion, as strong as it, shape (n_samples, 4).
 
     Faraday waves answer a vertical motion at these frequencies first. They are no part of F = M ü, and over few
@@ -178,7 +204,7 @@ def _wave_columns(acceleration: FloatArray, stretch: slice) -> FloatArray:
     n = stretch.stop - stretch.start
     # longer than the stretch by as much on both sides, where there is more: the transform is wrong at its ends
     first = max(stretch.start - n, 0)
-    longer = acceleration[first : stretch.stop + n]
+    longer = np.asarray(acceleration[first : stretch.stop + n], dtype=np.float64)
     moved = np.where(np.isfinite(longer), longer - np.nanmean(longer), 0.0)
     analytic = hilbert(moved)[stretch.start - first : stretch.stop - first]
     phase, size = np.unwrap(np.angle(analytic)), np.abs(analytic)

@@ -10,6 +10,7 @@ import xarray as xr
 
 from sloshlab.conditioning.combined_channels import acceleration_channels, force_channels, mean_acceleration
 from sloshlab.conditioning.gaps import sampling_step_s
+from sloshlab.conditioning.quality import sample_statistics
 from sloshlab.consistency.effect import Inertia
 from sloshlab.consistency.finding import Finding, contradiction
 from sloshlab.consistency.sensor_response import PairNoise, pair_noise
@@ -75,8 +76,8 @@ def _w_bar_std_of_noise(recording: xr.Dataset, inertia: Inertia, series: SensorS
     The work of a cycle is ∑ F u̇ Δt, so that noise σ gives σ (Ωu₀/√2) √(T Δt); W̄ divides by m_l (Ωu₀)².
     """
     omega = float(np.median(series.omega_rad_per_s))
-    acceleration = np.asarray(mean_acceleration(recording).values, dtype=np.float64)
-    velocity = math.sqrt(2.0) * float(np.nanstd(acceleration)) / omega
+    *_, acceleration_std = sample_statistics(mean_acceleration(recording).values)
+    velocity = math.sqrt(2.0) * acceleration_std / omega
     period = 2 * math.pi / omega
     of_cycle = math.sqrt(0.5 * period * sampling_step_s(recording)) / (inertia.liquid_kg * velocity)
     return of_cycle / math.sqrt(_WINDOW_CYCLES)

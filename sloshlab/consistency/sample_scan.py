@@ -252,11 +252,13 @@ def _error_bounds(
     _squared_errors(signal, square)
     # with as much before and after it as the filter is long, which changes no largest of positive numbers
     of_signal = power[half : half + n]
-    of_signal[:] = square[:n]
-    for i in np.flatnonzero(lost):
+    # one by one: to give an array to a slice, numba compiles an error message for seconds
+    for i in range(n):
+        of_signal[i] = square[i]
+    for at in np.flatnonzero(lost):
         # what is lost neither hides nor makes a stretch without noise: it counts as noise
-        of_signal[max(i - 2, 2) : min(i + 3, n - 2)] = np.finfo(np.float64).max
-        square[max(i - 4, 0) : i + 5] = 0.0
+        of_signal[max(at - 2, 2) : min(at + 3, n - 2)] = np.finfo(np.float64).max
+        square[max(at - 4, 0) : at + 5] = 0.0
     largest = _extremes(square[first:stop])[1]
     n_small = _n_not_above(square[first:stop], _SMALL_SHARE**2 * largest)
     # the largest of 1, 2, 4, 8 and 16 samples from each on, and of the 24 about it, from one array to the other

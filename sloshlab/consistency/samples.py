@@ -26,6 +26,7 @@ from sloshlab.consistency.sample_scan import (
     prediction_error,
     widened,
 )
+from sloshlab.order_statistics import median, quantile_of_sorted
 from sloshlab.recording import channels
 
 FloatArray = npt.NDArray[np.float64]
@@ -210,9 +211,9 @@ def _longest_hold(values: FloatArray, step: float) -> float:
     # the range first, which costs a tenth of quantiles
     if float(values.max() - values.min()) < 8 * step:
         return math.inf
-    low, high = np.quantile(values, (0.05, 0.95))
-    amplitude = 0.5 * float(high - low)
-    change = float(np.median(np.abs(np.diff(values))))
+    ascending = np.sort(values)
+    amplitude = 0.5 * (quantile_of_sorted(ascending, 0.95) - quantile_of_sorted(ascending, 0.05))
+    change = median(np.abs(np.diff(values)))
     # no faster than its own noise lets it seem: a channel at rest that only flickers may well stand still
     if amplitude < 4 * step or change <= 0:
         return math.inf

@@ -73,15 +73,14 @@ def pair_noise(
     whole = np.flatnonzero(np.isfinite(moments).all(axis=1))
     if whole.size < 4:
         return unknown
-    mean_y, power, product, e_yy, e_xx, cross = moments[whole].T
-    gain = np.divide(product, power, out=np.ones_like(power), where=power > 0)
+    mean_y, power, gain, e_yy, e_xx, cross, noise = moments[whole].T
     moving = (power > 0.01 * np.median(power)) & (gain != 0)
     if moving.sum() < 4:
         return unknown
     # medians over blocks: a block with a spike is one of many
     own = float(np.median((e_yy - gain * cross)[moving]))
     other = float(np.median((e_xx - cross / gain)[moving]))
-    loss, std = _compression(blocks, whole[moving], mean_y[moving], gain[moving])
+    loss, std = _compression(blocks, whole[moving], mean_y[moving], gain[moving], float(noise[moving].mean()))
     return PairNoise(
         std=math.sqrt(max(own, 0.0)) / WHITE_GAIN,
         reference_std=math.sqrt(max(other, 0.0)) / WHITE_GAIN,
@@ -106,13 +105,17 @@ class _Blocks:
         at = low - start + 2
         for signal, samples, error in zip(self._signals, self._samples, self._errors, strict=True):
             # beyond the ends of the signal, where the error is zero
-            samples[:] = 0.0
+            samples[:at] = samples[at + high - low :] = 0.0
             samples[at : at + high - low] = signal[low:high]
             _predicted_wrong(samples, error)
             error[:at] = 0.0
             error[max(self._signals[0].size - 2 - start, 0) :] = 0.0
         y, x = self._samples[:, 2:-2]
         return y, x, self._errors[0], self._errors[1]
+
+    def readings(self, block: int) -> FloatArray:
+        """y in a block, shape (n,), in double precision."""
+        return np.asarray(self._signals[0][block * self.n : (block + 1) * self.n], dtype=np.float64)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -126,8 +129,8 @@ def _predicted_wrong(samples: FloatArray, error: FloatArray) -> None:
 @njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})  # type: ignore[untyped-decorator]
 def _moments(
     y: FloatArray, x: FloatArray, e_y: FloatArray, e_x: FloatArray
-) -> tuple[float, float, float, float, float, float]:
-    """Mean of y, ⟨x²⟩ and ⟨x y⟩ about the means, ⟨e_y²⟩, ⟨e_x²⟩, ⟨e_x e_y⟩; NaN where a sample is lost."""
+) -> tuple[float, float, float, float, float, float, float]:
+    """Mean of y, ⟨x²⟩ about its mean, gain G, ⟨e_y²⟩, ⟨e_x²⟩, ⟨e_x e_y⟩, ⟨|e_y − G e_x|⟩; NaN if one is lost."""
     n, sum_y, sum_x = y.size, 0.0, 0.0
     for i in range(n):
         sum_y += y[i]
@@ -141,21 +144,24 @@ def _moments(
         e_yy += e_y[i] * e_y[i]
         e_xx += e_x[i] * e_x[i]
         cross += e_x[i] * e_y[i]
-    return mean_y, power / n, product / n, e_yy / n, e_xx / n, cross / n
+    gain, noise = product / power if power > 0.0 else 1.0, 0.0
+    for i in range(n):
+        noise += abs(e_y[i] - gain * e_x[i])
+    return mean_y, power / n, gain, e_yy / n, e_xx / n, cross / n, noise / n
 
 
 def _compression(
-    blocks: _Blocks, chosen: npt.NDArray[np.intp], mean: FloatArray, gain: FloatArray
+    blocks: _Blocks, chosen: npt.NDArray[np.intp], mean: FloatArray, gain: FloatArray, noise: float
 ) -> tuple[float, float]:
     """How much smaller the noise is at both ends of the readings than in their middle, with standard deviation."""
     n = chosen.size * blocks.n
-    reach, mean_noise = _reach_and_noise(blocks, chosen, mean, gain)
+    reach = _reach(blocks, chosen, mean)
     if reach == 0 or n < _N_LEVELS * _FEWEST_PER_LEVEL:
         return math.nan, math.nan
     counts, sizes = np.zeros(_N_LEVELS, dtype=np.int64), np.zeros(_N_LEVELS)
     for k, block in enumerate(chosen):
         y, _, e_y, e_x = blocks.of(int(block))
-        _by_level(y, e_y, e_x, _Level(mean[k], gain[k], reach, _CLIPPED_AT * mean_noise), counts, sizes)
+        _by_level(y, e_y, e_x, _Level(mean[k], gain[k], reach, _CLIPPED_AT * noise), counts, sizes)
     sizes /= np.maximum(counts, 1)
     middle = slice(_N_LEVELS // 2 - 1, _N_LEVELS // 2 + 2)
     if min(counts[0], counts[-1], counts[middle].sum()) < _FEWEST_PER_LEVEL or sizes[middle].mean() == 0:
@@ -166,18 +172,14 @@ def _compression(
     return loss, 0.756 * math.sqrt(3.0 / min(counts[0], counts[-1]))
 
 
-def _reach_and_noise(
-    blocks: _Blocks, chosen: npt.NDArray[np.intp], mean: FloatArray, gain: FloatArray
-) -> tuple[float, float]:
-    """Quantile of the magnitudes of all readings that is their reach, and the mean magnitude of the noise."""
-    n, noise = chosen.size * blocks.n, 0.0
+def _reach(blocks: _Blocks, chosen: npt.NDArray[np.intp], mean: FloatArray) -> float:
+    """Quantile of the magnitudes of all readings that is their reach."""
+    n = chosen.size * blocks.n
     largest: list[FloatArray] = []
     # as many of the largest as the quantile needs, kept as small as they can be while blocks come
     n_needed, limit, n_kept = n - math.floor(_REACH * (n - 1)), 0.0, 0
     for k, block in enumerate(chosen):
-        y, _, e_y, e_x = blocks.of(int(block))
-        reading = np.abs(y - mean[k])
-        noise += float(np.abs(e_y - gain[k] * e_x).sum())
+        reading = np.abs(blocks.readings(int(block)) - mean[k])
         kept = reading[reading >= limit]
         largest.append(kept)
         n_kept += kept.size
@@ -188,7 +190,7 @@ def _reach_and_noise(
     top = np.sort(np.concatenate(largest))[-n_needed:]
     # linear between two readings, as usual
     part = _REACH * (n - 1) % 1.0
-    return float(top[0] + part * (top[min(1, n_needed - 1)] - top[0])), noise / n
+    return float(top[0] + part * (top[min(1, n_needed - 1)] - top[0]))
 
 
 class _Level(NamedTuple):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Final
 
@@ -40,14 +41,16 @@ def level_finding(recording: xr.Dataset) -> Finding | None:
 
 def measured_level_g(recording: xr.Dataset) -> float:
     """Amplitude of the tank's acceleration in blocks of a second, the level that is kept or reached [g]."""
-    acceleration = np.asarray(mean_acceleration(recording).values, dtype=np.float64)
+    acceleration = mean_acceleration(recording).values
     n = max(round(1.0 / sampling_step_s(recording)), 16)
     n_blocks = acceleration.size // n
     if n_blocks < 4:
         return math.nan
     blocks = acceleration[: n_blocks * n].reshape(n_blocks, n)
-    levels = np.sqrt(2.0) * np.std(blocks[np.isfinite(blocks).all(axis=1)], axis=1)
-    return float(np.quantile(levels, _UPPER_LEVEL)) / GRAVITY_M_PER_S2 if levels.size else math.nan
+    # one after the other, so that what is computed of each stays in the cache
+    whole = itertools.compress(blocks, np.isfinite(blocks).all(axis=1))
+    levels = [math.sqrt(2.0) * float(np.std(block, dtype=np.float64)) for block in whole]
+    return float(np.quantile(levels, _UPPER_LEVEL)) / GRAVITY_M_PER_S2 if levels else math.nan
 
 
 def law_finding(recording: xr.Dataset, series: SensorSeries) -> Finding | None:

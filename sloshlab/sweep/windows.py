@@ -12,6 +12,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from sloshlab.constants import GRAVITY_M_PER_S2
+from sloshlab.order_statistics import median
 from sloshlab.quantities import described
 from sloshlab.rig import Rig
 from sloshlab.sweep.cycles import N_HARMONICS, Cycles
@@ -216,12 +217,12 @@ def _steady(cycles: Cycles, at: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
         return at
     amplitude = np.abs(cycles.acceleration_phasor[at, 0])
     frequency = np.log(cycles.omega_rad_per_s[at])
-    trend = np.median(np.diff(frequency) / np.diff(at)) * (at - at.mean())
+    trend = median(np.diff(frequency) / np.diff(at)) * (at - at.mean())
     # medians throughout: the transition that is sought must not shift the trend it is measured against
-    deviation = np.abs(frequency - trend - np.median(frequency - trend))
-    moving = amplitude > _SMALLEST_AMPLITUDE_RATIO * np.median(amplitude)
+    deviation = np.abs(frequency - trend - median(frequency - trend))
+    moving = amplitude > _SMALLEST_AMPLITUDE_RATIO * median(amplitude)
     # 1.4826 times the median deviation is the standard deviation of normal scatter
-    limit = max(_SMALLEST_OUTLIER, _OUTLIER_SIGMA * 1.4826 * float(np.median(deviation)))
+    limit = max(_SMALLEST_OUTLIER, _OUTLIER_SIGMA * 1.4826 * median(deviation))
     transition = ~moving | (deviation >= limit)
     # the phase is smoothed over two cycles, so that a neighbour has part of the transition
     beside = np.convolve(transition, np.ones(3), mode="same") > 0

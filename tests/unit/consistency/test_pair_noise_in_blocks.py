@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sloshlab.consistency.sensor_response import _Blocks, _reach_and_noise, pair_noise
+from sloshlab.consistency.sensor_response import _Blocks, _moments, _reach, pair_noise
 
 N, N_BLOCK = 40_150, 500
 
@@ -54,9 +54,9 @@ def test_the_reach_lies_between_two_readings(n_blocks):
     # of both signs, in any order, and with no mean of a block taken off
     y = generator.permutation(1.2 ** np.linspace(0.0, 150.0, n)) * generator.choice([-1.0, 1.0], n)
     chosen = np.arange(n_blocks)
-    reach, noise = _reach_and_noise(
-        _Blocks(y, np.zeros(n), n_block), chosen, np.zeros(n_blocks), np.zeros(n_blocks)
-    )
+    blocks = _Blocks(y, np.zeros(n), n_block)
+    reach = _reach(blocks, chosen, np.zeros(n_blocks))
     assert reach == pytest.approx(np.quantile(np.abs(y), 0.995), rel=1e-12)
     errors = np.abs(np.diff(y, 4))[:] / 6  # zero for two samples at both ends
+    noise = np.mean([_moments(*blocks.of(k))[-1] for k in chosen])
     assert noise == pytest.approx(errors.sum() / n, rel=1e-9)
