@@ -35,7 +35,7 @@ DOCS_BRANCH ?= gh-pages
 export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks aircraft wing rom-study closed-loop replay campaign tank-campaign tank-scaling pictures tank-diagnosis trial flight-trial rivals test test-times test-newest test-all lint format type bench bench-history fuzz soak wheel docs docs-publish clean tank-reference ball-network fill-level
+.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks aircraft wing rom-study closed-loop replay campaign tank-campaign tank-scaling pictures tank-diagnosis trial flight-trial rivals test test-times test-newest test-all lint format type bench bench-history bench-table fuzz soak wheel docs docs-publish clean tank-reference ball-network fill-level
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -191,6 +191,9 @@ bench: setup  ## speed and memory as ratios in one run (or BENCH="twin start", g
 
 bench-history: setup  ## the figures of the last `make bench` into the history of revisions, and its figure in docs
 	$(BIN)/python -m tests.benchmarks.history
+
+bench-table:  ## the last `make bench` beside its aims, as a table in Markdown
+	@$(BIN)/python -m tests.benchmarks.table
 
 fuzz: setup  ## damaged files to every reader, for FUZZ_SECONDS (600): no crash, no hang, no more than 2 GiB
 	$(BIN)/python -m tests.fuzz --seconds $(FUZZ_SECONDS)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -26,6 +27,7 @@ from tests.benchmarks.command_start import (
 )
 from tests.benchmarks.diagnosis import LONGEST_LABEL, MEDIAN_LABEL, diagnosis_figures
 from tests.benchmarks.diagnosis import MEMORY_LABEL as DIAGNOSIS_MEMORY_LABEL
+from tests.benchmarks.flights import AIR_LABEL, FLIGHT_LABEL, FLUTTER_LABEL
 from tests.benchmarks.flutter import FORCES_LABEL, KEPT_LABEL, LOCUS_LABEL
 from tests.benchmarks.history import described, keep
 from tests.benchmarks.numerical_tank import RESOLUTIONS, SIDE_BY_SIDE, label, tank_figures
@@ -34,6 +36,7 @@ from tests.benchmarks.own_twin import STEPS_LABEL
 from tests.benchmarks.reduced_order_model import MEMORY_LABEL, TIME_LABEL, model_figures
 from tests.benchmarks.reduced_order_model_in_the_twin import LOOP_LABEL
 from tests.benchmarks.scaling import CHANNELS_LABEL, NETWORKS_LABEL, TANKS_LABEL
+from tests.benchmarks.tanks_in_flight import LABEL as GUST_LABEL
 from tests.benchmarks.twin import FREE_LABEL, LANES_LABEL, METHODS, RANDOM_LABEL, RIVAL_LABEL
 
 ANALYSIS_LABEL = "netCDF to windows.nc and maps.nc [s]"
@@ -53,6 +56,11 @@ AIMS = {
     FORCES_LABEL: 60.0,
     KEPT_LABEL: 1.0,
     **{LOCUS_LABEL.format(liquids): 10.0 for liquids in LIQUIDS},
+    # as forces and root locus of the wing of the flutter above; sixty flights of a trial in a minute
+    AIR_LABEL: 60.0,
+    FLUTTER_LABEL: 10.0,
+    FLIGHT_LABEL: 1.0,
+    **{GUST_LABEL.format(liquids): 10.0 for liquids in LIQUIDS},
     MEDIAN_LABEL: 60.0,
     LONGEST_LABEL: 180.0,
     DIAGNOSIS_MEMORY_LABEL: 2.0,
@@ -168,12 +176,14 @@ def main() -> None:
     about, figures, failed = described(), dict[str, float](), []
     for name in asked:
         print(f"{name} …", flush=True)
+        began = time.monotonic()
         try:
             own = GROUPS[name]()
         except (Exception, SystemExit) as error:  # noqa: BLE001 – whatever it was, the others are measured
             failed.append(f"{name}: FAILED: {last_line(str(error)) or type(error).__name__}")
             print(failed[-1], flush=True)
             continue
+        print(f"{name}: {time.monotonic() - began:.0f} s by the clock", flush=True)
         keep(own, about)  # after each: an interrupted run leaves what it has measured
         figures |= own
     n_missed = printed(figures)

@@ -12,6 +12,8 @@ import pytest
 from tests.benchmarks.__main__ import AIMS, AT_LEAST, GROUPS
 from tests.benchmarks.history import HISTORY, described, draw, keep, machine, over_aims, with_entry
 from tests.benchmarks.own_process import MeasurementError, measured_apart
+from tests.benchmarks.table import ROWS, table
+from tests.benchmarks.twin import RIVAL_LABEL
 
 
 def run(revision: str, **figures: float) -> dict[str, object]:
@@ -110,3 +112,18 @@ def test_a_run_without_misses_and_failures_ends_well(tmp_path: Path, monkeypatch
     with pytest.raises(SystemExit) as ended:
         bench.main()
     assert ended.value.code == 0
+
+
+def test_the_table_gives_a_reason_where_an_aim_is_missed_and_nowhere_else() -> None:
+    rival = RIVAL_LABEL.format("DOP853")
+    cells = {
+        line.split(" | ")[0][2:]: [cell.strip(" |") for cell in line.split(" | ")]
+        for line in table({rival: 49.0, "networks": 1.0, "10 × longer recording costs": 10.0}).splitlines()[2:]
+    }
+    reasons = {row.work: row.reason for row in ROWS}
+    assert cells["the same, DOP853"][1:] == ["33.8", "≥ 50", "49", reasons["the same, DOP853"]]
+    assert cells["ten times the recording over one"][1:] == ["8.68", "≤ 10", "10", ""]
+    assert cells["10 s of beam and model 60 × 20 [s]"][2:4] == ["≤ 0.012", "not measured"]
+    assert table({rival: 51.0}).count(reasons["the same, DOP853"]) == 0
+    # a label that no figure has would never be filled
+    assert {row.label for row in ROWS} - set(AIMS) - set(AT_LEAST) == {"… of ten times the recording"}
