@@ -7,6 +7,7 @@ import pytest
 from scipy.ndimage import maximum_filter1d
 
 from sloshlab.consistency.sample_scan import QUIETEST_STRETCH, ScannedChannel
+from sloshlab.consistency.samples import _longest_hold
 
 RATE_HZ = 500.0
 """Of blocks of 500 samples."""
@@ -90,3 +91,14 @@ def test_equal_neighbours_are_counted_across_blocks():
     assert bounds.long_runs.tolist() == [[490, 510], [1_985, 2_000]]
     assert bounds.n_repeated == np.count_nonzero(values[1:] == values[:-1])
     assert bounds.step == 0.25
+
+
+@pytest.mark.parametrize("n", [30, 41, 77])
+def test_the_longest_hold_is_that_of_an_amplitude_between_two_readings(n):
+    """Readings that grow by a fifth from one to the next: another place for the quantiles is seen."""
+    values = np.random.default_rng(n).permutation(1.2 ** np.arange(n))
+    low, high = np.quantile(values, [0.05, 0.95])
+    amplitude, step = 0.5 * (high - low), 1e-3
+    # of a sine, whose median change is 1/√2 of the largest, ωA in a sample
+    omega = np.median(np.abs(np.diff(values))) / np.sqrt(0.5) / amplitude
+    assert _longest_hold(values, step) == pytest.approx(2 * np.arccos(1 - step / amplitude) / omega, rel=1e-4)
