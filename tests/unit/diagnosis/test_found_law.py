@@ -28,8 +28,8 @@ Force = Callable[[float, float, float], float]
 
 def retuned_alone(self: ModelSelection, retuned: FreeRunFit) -> list[FreeRunFit]:
     """In place of the search for names, which takes minutes and has none for these forces."""
-    self._keep([retuned])
-    return self._sorted()
+    self.known.keep([retuned])
+    return self.known.in_order()
 
 
 @pytest.fixture
