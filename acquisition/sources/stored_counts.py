@@ -24,7 +24,7 @@ from acquisition.samples.channel import HIGHEST_SAMPLING_RATE_HZ, MOST_CHANNELS,
 from acquisition.samples.delivery import CountArray
 from sloshlab.errors import RecordingError
 from sloshlab.file_structure import require_sound_structure
-from sloshlab.netcdf_lock import NETCDF_LOCK
+from sloshlab.netcdf_lock import NETCDF_ERRORS, NETCDF_LOCK
 from sloshlab.recording import JITTER_ALLOWED_STEPS, read_attributes, validate_recording
 from sloshlab.units import SI_UNITS
 
@@ -36,17 +36,6 @@ _PIECE_SAMPLES = 1 << 16
 # a file chooses its own chunks, and each is decompressed as a whole
 _LARGEST_STORAGE_CHUNK = 1 << 26
 _DESCRIPTIVE = ("range_min", "range_max", "noise_std", "x_m", "block_from", "block_to", "sensor_serial")
-_STUMBLES = (
-    OSError,
-    RuntimeError,
-    UnicodeError,
-    AttributeError,
-    LookupError,
-    TypeError,
-    ValueError,
-    OverflowError,
-)
-"""What the netCDF library raises on damaged files."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +143,7 @@ class StoredCounts:
             yield
         except RecordingError:
             raise
-        except _STUMBLES as error:
+        except NETCDF_ERRORS as error:
             raise RecordingError(
                 f"recording {self._file}",
                 got=f"a file that cannot be read ({error})",

@@ -14,7 +14,7 @@ from sloshlab.errors import RecordingError, SloshlabError
 from sloshlab.file_structure import require_recording_file, require_sound_structure
 from sloshlab.hdf5_contents import require_self_contained
 from sloshlab.limited_process import ReadingLimits, UntrustedFile
-from sloshlab.netcdf_lock import NETCDF_LOCK
+from sloshlab.netcdf_lock import NETCDF_ERRORS, NETCDF_LOCK
 from sloshlab.recording.attributes import RunAttributes, attributes_of, validated_attributes
 from sloshlab.recording.decoding import MAXIMUM_DECODED_BYTES, decoded
 from sloshlab.recording.time_axis import time_coordinate
@@ -143,16 +143,7 @@ def _opened(file: Path) -> Iterator[Any]:
             yield source
     except RecordingError:
         raise
-    except (
-        OSError,
-        RuntimeError,
-        UnicodeError,
-        AttributeError,
-        LookupError,
-        TypeError,
-        ValueError,
-        OverflowError,
-    ) as error:
+    except NETCDF_ERRORS as error:
         raise RecordingError(
             f"recording {file}",
             got=f"a file that cannot be read ({error})",
