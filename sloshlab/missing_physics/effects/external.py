@@ -156,31 +156,73 @@ def _best_places(values: FloatArray, periods: FloatArray, alternate: bool) -> Fl
     """
     best = np.zeros((periods.size, 2, 4))
     for i, period in enumerate(periods):
-        n_places = int(period)
-        sums, counts = np.zeros(n_places), np.zeros(n_places)
-        sign = 1.0
-        for pulse in range(int(values.size / period) + 1):
+        n_places = min(int(period), values.size)
+        sums, sign = np.zeros(int(period)), 1.0
+        n_pulses = int(values.size / period)
+        for pulse in range(n_pulses + 1):
             # a period need not be a whole number of places, or later pulses would slip
-            start = round(pulse * period)
-            for k in range(min(n_places, values.size - start)):
-                sums[k] += sign * values[start + k]
-                counts[k] += 1.0
+            start = int(np.rint(pulse * period))
+            along = values[start : start + sums.size]
+            # two plain loops, in each of which one instruction does several places
+            if sign > 0:
+                for k in range(along.size):
+                    sums[k] += along[k]
+            else:
+                for k in range(along.size):
+                    sums[k] -= along[k]
             if alternate:
                 sign = -sign
+        # Trains that begin early enough have one pulse more before the end.
+        n_longer = max(min(n_places, values.size - int(np.rint(n_pulses * period))), 0)
         # A train that explains nothing has its first pulse, too: its weight must not be zero.
-        best[i, :, 2] = counts[0]
-        for k in range(min(n_places, values.size)):
-            later = sums[k] - values[k]
-            for total, count, begins in (
-                (sums[k], counts[k], float(k)),
-                (-sums[k] if alternate else 0.0, counts[k], k - period),
-                (-later if alternate else later, counts[k] - 1.0, k + period),
-            ):
-                row = 0 if total > 0 else 1
-                if count > 0 and total**2 / count > best[i, row, 0]:
-                    best[i, row, 0], best[i, row, 1] = total**2 / count, abs(total)
-                    best[i, row, 2], best[i, row, 3] = count, begins
+        best[i, :, 2] = n_pulses + (n_longer > 0)
+        _keep_extremes(best[i], sums, values, (0, n_longer), n_pulses + 1.0, period, alternate)
+        _keep_extremes(best[i], sums, values, (n_longer, n_places), float(n_pulses), period, alternate)
     return best
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _keep_extremes(
+    best: FloatArray,
+    sums: FloatArray,
+    values: FloatArray,
+    places: tuple[int, int],
+    count: float,
+    period: float,
+    alternate: bool,
+) -> None:
+    """Better trains among those that begin from one place to another, all of so many pulses; into `best`.
+
+    Of trains of one number of pulses the largest sum and the least one explain most.
+    """
+    first, end = places
+    if first >= end:
+        return
+    high = low = high_later = low_later = first
+    largest = least = sums[first]
+    largest_later = least_later = sums[first] - values[first]
+    for k in range(first + 1, end):
+        own, later = sums[k], sums[k] - values[k]
+        if own > largest:
+            largest, high = own, k
+        if own < least:
+            least, low = own, k
+        if later > largest_later:
+            largest_later, high_later = later, k
+        if later < least_later:
+            least_later, low_later = later, k
+    reverse = -1.0 if alternate else 1.0
+    for total, weight, begins in (
+        (largest, count, float(high)),
+        (least, count, float(low)),
+        (-largest if alternate else 0.0, count, high - period),
+        (-least if alternate else 0.0, count, low - period),
+        (reverse * largest_later, count - 1.0, high_later + period),
+        (reverse * least_later, count - 1.0, low_later + period),
+    ):
+        row = 0 if total > 0 else 1
+        if weight > 0 and total**2 / weight > best[row, 0]:
+            best[row, 0], best[row, 1], best[row, 2], best[row, 3] = total**2 / weight, abs(total), weight, begins
 
 
 # --- a machine that runs by itself -----------------------------------------------------------------------------
