@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pipelines.diagnosis.results import Diagnosis
-from pipelines.diagnosis.worker_threads import WorkerThreads
+from pipelines.diagnosis.workers import Workers
 from pipelines.inputs.recordings import RunSource, recording_of
 from pipelines.inputs.rigs import RigSource, folder_of, rig_of
 from pipelines.report.outputs import RESULT_ID, provenance_of, report_lines
@@ -178,11 +178,11 @@ def diagnosed(
     if twin is not None:
         described = load_user_twin(twin)
         case, cut = with_known_drive(case, described.driving)
-        model = UserTwinModel(described, case.runs, name=f"twin {twin}", executor=WorkerThreads())
+        model = UserTwinModel(described, case.runs, name=f"twin {twin}", executor=Workers())
     elif is_flight(case.folder):
         wing = flight_twin(case.folder / MODEL)
         case, cut = with_known_drive(case, wing.driving)
-        model = BlockTwinModel(wing, case.runs, name=f"model {case.folder / MODEL}", executor=WorkerThreads())
+        model = BlockTwinModel(wing, case.runs, name=f"model {case.folder / MODEL}", executor=Workers())
     # Before the search: who reads that a run is lacking may record it instead of waiting for an answer.
     untold = iter(informative_runs(case).lines)
     with amounts("diagnosing", _STAGES) as advance:
@@ -193,7 +193,7 @@ def diagnosed(
                 told(line)
             advance(done, max(of, 1), what)
 
-        found = findings_of(case, progressed, model, executor=WorkerThreads())
+        found = findings_of(case, progressed, model, executor=Workers())
         verdict = verdict_of(found)
     examination = examined(found)
     named = verdict.best if verdict.kind != "unknown" else None

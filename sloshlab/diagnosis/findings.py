@@ -15,7 +15,7 @@ from sloshlab.diagnosis.inference.posterior import Posterior, posterior
 from sloshlab.diagnosis.inference.run_noise import run_noise
 from sloshlab.diagnosis.inference.sampled_jumps import with_sampled_jumps
 from sloshlab.diagnosis.inference.scored_model import ScoredModel, scored
-from sloshlab.diagnosis.inference.whitened import whitened
+from sloshlab.diagnosis.inference.whitened import WhitenedRun, whitened
 from sloshlab.diagnosis.selection.explained_scatter import ExplainedScatter
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
 from sloshlab.diagnosis.selection.known_fits import N_KEPT
@@ -24,6 +24,7 @@ from sloshlab.diagnosis.surroundings import surroundings_of
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.identification.case import Case
 from sloshlab.identification.diagnosed_model import DiagnosedModel
+from sloshlab.identification.effort import Effort
 from sloshlab.identification.free_run_fit import INFLATION_STAGES, fitted, fitted_baseline
 from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.identification.noise_floor import weighted_observations
@@ -40,6 +41,7 @@ from sloshlab.twin.lane_preparation import IN_TURN, Executor
 assert effects.__all__  # importing the vocabulary makes it known
 
 FloatArray = NDArray[np.float64]
+_Residuals = list[tuple[FloatArray, list[FloatArray]]]
 Progress = Callable[[str, int, int], None]
 _MOST_SCORED: Final = 16
 """Models with effects, the lowest costs first, that could be the best."""
@@ -158,7 +160,7 @@ def findings_of(
     believed, retuned = score.required(believed_fit, "as believed"), score.required(nothing, "retuned")
     # Others are too far behind to have any probability; a few of them say by how much.
     n_scored = min(max(sum(map(known.may_win, with_effects)), N_KEPT), _MOST_SCORED)
-    explanations = [found for fit in with_effects[:n_scored] if (found := score.of(fit, retuned)) is not None]
+    explanations = score.explaining(with_effects[:n_scored], retuned, runs.effort)
     return Findings(
         case,
         model,
@@ -212,10 +214,33 @@ class Scoring:
 
     def of(self, fit: FreeRunFit, nothing: ScoredModel | None = None) -> ScoredModel | None:
         """A model; None where it does not reach the end of a run that it was not fitted to."""
+        return self._scored(fit, self._whitened(fit), nothing)
+
+    def explaining(self, fits: Sequence[FreeRunFit], nothing: ScoredModel, effort: Effort) -> list[ScoredModel]:
+        """The same of several, those left out that do not reach an end."""
+        found = zip(fits, effort.spent_on(self.model.executor, self._whitened, fits), strict=True)
+        models = [self._scored(fit, whitened_runs, nothing) for fit, whitened_runs in found]
+        return [model for model in models if model is not None]
+
+    def _whitened(self, fit: FreeRunFit) -> tuple[dict[str, float], _Residuals] | None:
+        """Values in all runs, and of each run residuals and by what diverging motions differ."""
         values = values_of_runs(self.model, self.held_out, fit)
         runs = whitened(self.model, self.everything, fit.candidates, values, self.noise, self._motions)
-        if runs is None:
+        return None if runs is None else (values, [(run.residual, run.diverging) for run in runs])
+
+    def _scored(
+        self,
+        fit: FreeRunFit,
+        found: tuple[dict[str, float], _Residuals] | None,
+        nothing: ScoredModel | None,
+    ) -> ScoredModel | None:
+        if found is None:
             return None
+        values, residuals = found
+        runs = [
+            WhitenedRun(observed, residual, noise, diverging)
+            for observed, noise, (residual, diverging) in zip(self.everything, self.noise, residuals, strict=True)
+        ]
         return scored(fit, values, runs, {run[0].run.name for run in self.held_out}, nothing, self.tests)
 
     def required(self, fit: FreeRunFit, which: str) -> ScoredModel:

@@ -15,9 +15,9 @@ from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
 from sloshlab.identification.cluster_robust_errors import cluster_robust_errors
 from sloshlab.identification.diagnosed_model import EXACT
-from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, robust_weights
+from sloshlab.identification.free_run_problem import robust_weights
 from sloshlab.identification.profile_likelihood import profiled_distance
-from sloshlab.missing_physics.candidate import Candidate
+from sloshlab.missing_physics.candidate import Candidate, EffectParameter
 from sloshlab.missing_physics.units import is_calibrated
 
 LEVEL: Final = 0.90
@@ -63,31 +63,28 @@ def intervals_of(found: Findings, best: ScoredModel) -> dict[tuple[str, str], In
     fit = replace(best.fit, covariance=covariance, names=problem.names, scales=problem.scales, prior_weights=prior)
     scatter = cluster_robust_errors(problem, fit, jacobian)
     noise = max(1.0, best.fitted_rms)
-    return {
-        (candidate.key, parameter.name): _interval(problem, fit, noise, candidate, parameter.name, scatter)
+    numbers = [
+        (candidate, parameter)
         for candidate in best.fit.candidates
         for parameter in candidate.effect.parameters
         # Numbers of runs that were not fitted have none.
         if f"{candidate.key}.{parameter.name}" in best.fit.names
+    ]
+
+    def end(item: tuple[Candidate, EffectParameter, float]) -> float:
+        candidate, parameter, sign = item
+        name = f"{candidate.key}.{parameter.name}"
+        estimate = fit.values[name]
+        of_noise, of_belief = fit.standard_errors(name)
+        of_noise = max(of_noise * noise, scatter.get(name, 0.0))
+        of_simulation = EXACT * abs(estimate) if is_calibrated(parameter.name) else 0.0
+        width = _DEVIATIONS * float(np.sqrt(of_noise**2 + of_belief**2 + of_simulation**2))
+        within = estimate + profiled_distance(problem, fit, name, sign * width)
+        return float(np.clip(within, *candidate.bounds(parameter)))
+
+    items = [(*number, sign) for number in numbers for sign in (-1.0, 1.0)]
+    ends = runs.effort.spent_on(found.model.executor, end, items)
+    return {
+        (candidate.key, parameter.name): Interval(fit.values[f"{candidate.key}.{parameter.name}"], low, high)
+        for (candidate, parameter), low, high in zip(numbers, ends, ends, strict=True)
     }
-
-
-def _interval(
-    problem: FreeRunProblem,
-    fit: FreeRunFit,
-    noise: float,
-    candidate: Candidate,
-    parameter: str,
-    scatter: dict[str, float],
-) -> Interval:
-    name = f"{candidate.key}.{parameter}"
-    estimate = fit.values[name]
-    of_noise, of_belief = fit.standard_errors(name)
-    of_noise = max(of_noise * noise, scatter.get(name, 0.0))
-    of_simulation = EXACT * abs(estimate) if is_calibrated(parameter) else 0.0
-    width = _DEVIATIONS * float(np.sqrt(of_noise**2 + of_belief**2 + of_simulation**2))
-    lowest, highest = candidate.bounds(
-        next(each for each in candidate.effect.parameters if each.name == parameter)
-    )
-    down, up = (profiled_distance(problem, fit, name, sign * width) for sign in (-1.0, 1.0))
-    return Interval(estimate, max(estimate + down, lowest), min(estimate + up, highest))

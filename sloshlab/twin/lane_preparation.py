@@ -43,6 +43,12 @@ class Executor(Protocol):
     def map(self, function: Callable[[_Item], _Result], items: Iterable[_Item], /) -> Iterable[_Result]:
         """Results in the order of the items."""
 
+    def map_apart(self, function: Callable[[_Item], _Result], items: Iterable[_Item], /) -> Iterable[_Result]:
+        """The same of pieces that take long, perhaps in processes of their own.
+
+        What comes back are numbers, strings, arrays and what is made of them; what else a piece changes is lost.
+        """
+
 
 class InTurn:
     """One piece after the other."""
@@ -50,6 +56,10 @@ class InTurn:
     def map(self, function: Callable[[_Item], _Result], items: Iterable[_Item], /) -> list[_Result]:
         """Results in the order of the items."""
         return [function(item) for item in items]
+
+    def map_apart(self, function: Callable[[_Item], _Result], items: Iterable[_Item], /) -> list[_Result]:
+        """The same."""
+        return self.map(function, items)
 
 
 IN_TURN: Final = InTurn()

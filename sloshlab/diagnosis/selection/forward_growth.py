@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -134,7 +134,7 @@ class ForwardGrowth:
 
     def fitted_to_the_end(
         self, coarse: Sequence[FreeRunFit], base: FreeRunFit, hopeless_cost: HopelessCost | None = None
-    ) -> Iterable[FreeRunFit]:
+    ) -> Iterator[FreeRunFit]:
         """Fits on all runs, beside a base, as the workers of the model make them.
 
         Parameters
@@ -145,10 +145,15 @@ class ForwardGrowth:
         """
 
         def to_the_end(fit: FreeRunFit) -> FreeRunFit:
-            self._say_fitting(fit.candidates)
-            return full_fit(self.known.runs, fit, base, hopeless_cost)
+            return replace(full_fit(self.known.runs, fit, base, hopeless_cost), candidates=())
 
-        return self.known.runs.model.executor.map(to_the_end, coarse)
+        runs = self.known.runs
+        fits = runs.effort.spent_on(runs.model.executor, to_the_end, coarse)
+        for begun in coarse[:1]:
+            self._say_fitting(begun.candidates)
+        for begun, fit in zip(coarse, fits, strict=True):
+            self._say_fitting(begun.candidates)
+            yield replace(fit, candidates=begun.candidates)
 
     def matched_beside(self, fit: FreeRunFit, what: str) -> MatchedForces:
         """Forces matched to what is missing beside a fit, once for every model.

@@ -76,7 +76,7 @@ def hidden_effects(
     of_quiet = quiet.problem_of(fit)
     places = Places.beside(quiet, fit, of_quiet.residual(of_quiet.theta_of(fit.values)))
 
-    def of_candidate(candidate: Candidate) -> HiddenEffect | None:
+    def of_candidate(candidate: Candidate) -> tuple[dict[str, float], float] | None:
         extended = runs.problem((*fit.candidates, candidate))
         own = [i for i, name in enumerate(extended.names) if name.startswith(f"{candidate.key}.")]
         spacings = places_in_runs(extended, candidate)
@@ -95,12 +95,12 @@ def hidden_effects(
             for start in starts:
                 yield start, list(islice(residuals, len(sizes)))
 
-        def hidden(start: dict[str, float], change: FloatArray) -> HiddenEffect | None:
+        def hidden(start: dict[str, float], change: FloatArray) -> tuple[dict[str, float], float] | None:
             if not (np.isfinite(change).all() and change.any()):
                 return None
             theta, factor, gain = about.with_effect(change, *_factors(candidate, start))
             values = {**problem.values(theta), **candidate.sized(start, factor)}
-            return HiddenEffect(candidate, values, gain - chosen_among) if isfinite(gain) else None
+            return (values, gain - chosen_among) if isfinite(gain) else None
 
         def slope(one: FloatArray, two: FloatArray, three: FloatArray) -> FloatArray:
             if not all(np.isfinite(each).all() for each in (one, two, three)):
@@ -113,13 +113,15 @@ def hidden_effects(
             # One size tells the slope well enough to see what is far from the gain that is asked for.
             changes = ((start, (at - about.residual) / _SMALL) for start, [at] in moved(starts, _SIZES[:1]))
             by_one = [(start, hidden(start, change)) for start, change in changes]
-            starts = [start for start, each in by_one if each is not None and each.gain > 0.5 * least]
+            starts = [start for start, each in by_one if each is not None and each[1] > 0.5 * least]
         slopes = (slope(*of_sizes) for _, of_sizes in moved(starts, _SIZES))
         found = [hidden(start, change) for start, change in zip(starts, slopes, strict=True)]
-        return max((each for each in found if each is not None), key=lambda each: each.gain, default=None)
+        return max((each for each in found if each is not None), key=lambda each: each[1], default=None)
 
-    each = runs.model.executor.map(of_candidate, missing_from(fit, pool))
-    return sorted((hidden for hidden in each if hidden is not None), key=lambda hidden: -hidden.gain)
+    others = missing_from(fit, pool)
+    best = zip(others, runs.effort.spent_on(runs.model.executor, of_candidate, others), strict=True)
+    found = [HiddenEffect(candidate, *hidden) for candidate, hidden in best if hidden is not None]
+    return sorted(found, key=lambda hidden: -hidden.gain)
 
 
 def _directions(candidate: Candidate, places: Places) -> list[dict[str, float]]:

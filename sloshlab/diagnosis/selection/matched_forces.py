@@ -73,7 +73,7 @@ def matched_forces(runs: FittedRuns, fit: FreeRunFit, pool: Sequence[Candidate],
     if not np.isfinite(residual).all():
         return MatchedForces()
     matches = _Matches(runs, Places.beside(runs, fit, residual), missing_from(fit, pool))
-    matches.improve(matches.candidates, matches.ranked)
+    matches.rank()
     matches.improve(matches.hopeful(), matches.refined)
     return matches.found([candidate for candidate in matches.hopeful() if matches.explains(candidate)][:n_leading])
 
@@ -96,7 +96,7 @@ class _Matches:
     """
 
     def __init__(self, runs: FittedRuns, places: Places, pool: Sequence[Candidate]) -> None:
-        self._places, self._executor = places, runs.model.executor
+        self._places, self._executor, self._effort = places, runs.model.executor, runs.effort
         matching = matchings(list(places.forces.values()), runs.effort)
         self._matching, self._everything = matching.of, matching.power
         self.candidates = [candidate for candidate in pool if candidate.effect.block in self._matching]
@@ -120,9 +120,14 @@ class _Matches:
             self,
         )
 
+    def rank(self) -> None:
+        """Match the draws of all candidates."""
+        self.improve(self.candidates, self.ranked)
+        self._population = dict(self.of)
+
     def improve(self, candidates: Sequence[Candidate], matches_of: Callable[[Candidate], list[Match]]) -> None:
         """Replace the matches of some candidates."""
-        found = zip(candidates, self._executor.map(matches_of, candidates), strict=True)
+        found = zip(candidates, self._effort.spent_on(self._executor, matches_of, candidates), strict=True)
         self.of |= {candidate.key: matches for candidate, matches in found if matches}
 
     def ranked(self, candidate: Candidate) -> list[Match]:
@@ -131,8 +136,7 @@ class _Matches:
         if not place.is_more_than_noise or force_alone(candidate, candidate.starts()[0]) is None:
             return []
         starts = [*self._places.of(candidate), *candidate.sought_at()]
-        self._population[candidate.key] = place.ranked(candidate, starts)
-        return self._population[candidate.key]
+        return place.ranked(candidate, starts)
 
     def refined(self, candidate: Candidate) -> list[Match]:
         """By least squares from the best draws."""

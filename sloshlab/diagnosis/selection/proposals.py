@@ -20,6 +20,8 @@ from sloshlab.missing_force.latent_force import RunForces
 from sloshlab.missing_physics.candidate import Candidate, MissingForces
 
 FloatArray = NDArray[np.float64]
+_Promise = tuple[dict[str, float], tuple[float, ...]]
+"""Of a proposal, the start and what is predicted."""
 NO_STARTS: Final[Mapping[str, Sequence[Mapping[str, float]]]] = {}
 _DRAWS_PER_NUMBER: Final = 6
 """Quasi-random starts from the prior of an effect, for each of its numbers; those of single runs count once."""
@@ -147,7 +149,7 @@ def _beside(
     first = next(iter(least))
     first_weights = problem.inflation_weights(first)
 
-    def of_candidate(candidate: Candidate) -> list[Proposal]:
+    def of_candidate(candidate: Candidate) -> list[_Promise]:
         key = candidate.key
         is_drawn = key not in promising and key not in compared
         sets = places.of(candidate, None if is_drawn else promising.get(key, ()))
@@ -157,13 +159,13 @@ def _beside(
         # The base is the extended model whose last effect has no size: a sensor changes its channel alone.
         own = [i for i, name in enumerate(extended.names) if name.startswith(f"{candidate.key}.")]
         moved = zip(sets, extended.residuals_moved(thetas, own, residual), strict=True)
-        found: list[Proposal] = []
+        found: list[_Promise] = []
         while some := list(islice(moved, _N_AT_ONCE)):
             # A start that explodes is no reason to drop the candidate as long as another one runs.
             found += promised(candidate, [(start, at) for start, at in some if np.isfinite(at).all()])
         return found
 
-    def promised(candidate: Candidate, running: Sequence[tuple[dict[str, float], FloatArray]]) -> list[Proposal]:
+    def promised(candidate: Candidate, running: Sequence[tuple[dict[str, float], FloatArray]]) -> list[_Promise]:
         changes = [at_start - residual for _, at_start in running]
         gains = [test.gains(changes) for _, test, _ in tests] if changes else []
         found = []
@@ -176,12 +178,17 @@ def _beside(
             at_once = huber_cost(first_weights * at_start) / max(least[first], 1e-300)
             factor = gains[int(np.argmin(predicted))][i][1]
             sized = candidate.sized(start, min(max(factor, 1.0 / _MOST_STEP), _MOST_STEP))
-            values = {**base.fit.values, **sized}
-            found.append(Proposal((*base.fit.candidates, candidate), values, (*predicted, at_once), base.jacobian))
+            found.append(({**base.fit.values, **sized}, (*predicted, at_once)))
         return found
 
     others = missing_from(base.fit, pool)
-    return [proposal for found in runs.model.executor.map(of_candidate, others) for proposal in found]
+    return [
+        Proposal((*base.fit.candidates, candidate), start, predicted, base.jacobian)
+        for candidate, found in zip(
+            others, runs.effort.spent_on(runs.model.executor, of_candidate, others), strict=True
+        )
+        for start, predicted in found
+    ]
 
 
 def missing_from(fit: FreeRunFit, pool: Sequence[Candidate]) -> list[Candidate]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -64,11 +64,15 @@ def halved(
     running = [_Running(proposal, proposal.start, None, np.inf) for proposal in waiting]
     for rung, inflation in enumerate(stages):
 
-        def continued(i: int, begun: Sequence[_Running] = running, inflation: float = inflation) -> _Running:
-            said(" + ".join(sorted(begun[i].proposal.keys)), i, len(begun))
-            return _continued(runs, begun[i], inflation)
+        def continued(begun: _Running, inflation: float = inflation) -> tuple[FreeRunFit, float]:
+            fit, cost = _continued(runs, begun, inflation)
+            return replace(fit, candidates=()), cost
 
-        done = list(runs.model.executor.map(continued, range(len(running))))
+        fits, done = runs.effort.spent_on(runs.model.executor, continued, running), []
+        for i, (each, (fit, cost)) in enumerate(zip(running, fits, strict=True)):
+            said(" + ".join(sorted(each.proposal.keys)), i, len(running))
+            fit = replace(fit, candidates=each.proposal.candidates)
+            done.append(_Running(each.proposal, fit.values, fit, cost))
         is_last = rung == len(stages) - 1
         running = _better(done, n_kept * 2 ** (len(stages) - 1 - rung), 1 if is_last else _STARTS_OF_A_MODEL)
     return [each.fit for each in running if each.fit is not None]
@@ -88,7 +92,7 @@ def _best_starts(proposed: Sequence[Proposal], n: int) -> list[Proposal]:
     return [proposed[i] for i in np.argsort(rank, kind="stable")[:n] if np.isfinite(rank[i])]
 
 
-def _continued(runs: FittedRuns, running: _Running, inflation: float) -> _Running:
+def _continued(runs: FittedRuns, running: _Running, inflation: float) -> tuple[FreeRunFit, float]:
     """A few more steps, with the derivatives of the base and new ones by the effect's own numbers."""
     # Derivatives are not kept from rung to rung: those of all models together would fill the memory.
     problem = runs.problem(running.proposal.candidates)
@@ -97,7 +101,7 @@ def _continued(runs: FittedRuns, running: _Running, inflation: float) -> _Runnin
         problem, running.values, n_iterations=_STEPS_OF_A_RUNG, stages=(inflation,), known=known, is_last=False
     )
     cost = np.inf if fit.trouble else inflated_cost(problem, fit, inflation)
-    return _Running(running.proposal, fit.values, fit, cost)
+    return fit, cost
 
 
 def _better(running: Sequence[_Running], n: int, of_a_model: int) -> list[_Running]:

@@ -198,6 +198,8 @@ def test_motions_do_not_depend_on_who_works_in_which_order() -> None:
         def map(self, function: Callable[[Any], Any], items: Iterable[Any], /) -> list[Any]:
             return [function(item) for item in reversed(list(items))][::-1]
 
+        map_apart = map
+
     lanes = [
         Lane(Twin(own, TERMS["friction"](1.0 + 0.1 * i)), shaken(i // 9), (0.0, 0.0), 2)
         for i, own in enumerate(beams(27, OSCILLATOR))

@@ -1,0 +1,125 @@
+"""Workers that share a diagnosis: threads for what is short, processes for pieces that take long.
+
+Compiled loops let the interpreter go while they run, so that threads share them; the Python between them, which is
+most of a simulation of a small rig, only processes do at the same time.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing.synchronize import Event
+from typing import Any, Final, TypeVar
+
+_Item = TypeVar("_Item")
+_Result = TypeVar("_Result")
+FORKS: Final = sys.platform == "linux"
+"""Whether a process may go on from a copy of another one: not where system libraries forbid it."""
+_PERIOD_S: Final = 1.0
+"""Of looking whether the process for which a worker works is still there."""
+_piece: Callable[[int], Any] | None = None
+"""Of a worker process: its work by number."""
+
+
+class Workers:
+    """As many as this process may use cores; work that asks for workers itself does its own in turn.
+
+    Parameters
+    ----------
+    n_workers : int, optional
+        Cores of the machine that this process may use by default.
+
+    Examples
+    --------
+    >>> list(Workers(2).map(abs, [-1, -2, 3]))
+    [1, 2, 3]
+    """
+
+    def __init__(self, n_workers: int | None = None) -> None:
+        self.n_workers = n_workers or _n_cores()
+        self._pool = ThreadPoolExecutor(self.n_workers)
+        self._within = threading.local()
+
+    def map(self, function: Callable[[_Item], _Result], items: Iterable[_Item], /) -> list[_Result]:
+        """Results in the order of the items, by threads."""
+        work = list(items)
+        if self._is_in_turn(len(work)):
+            return [function(item) for item in work]
+
+        def done(item: _Item) -> _Result:
+            self._within.is_worker = True
+            return function(item)
+
+        return list(self._pool.map(done, work))
+
+    def map_apart(self, function: Callable[[_Item], _Result], items: Iterable[_Item], /) -> Iterable[_Result]:
+        """Results in the order of the items, by processes that begin as copies of this one.
+
+        They know all that this one knows, and what they come to know beside their results is lost.
+        """
+        work = list(items)
+        if self._is_in_turn(len(work)):
+            return map(function, work)
+        return self._by_processes(function, work) if FORKS else self.map(function, work)
+
+    def _is_in_turn(self, n_items: int) -> bool:
+        # a worker that waited for others of the same pool could wait for ever
+        return self.n_workers == 1 or n_items < 2 or getattr(self._within, "is_worker", False)
+
+    def _by_processes(self, function: Callable[[_Item], _Result], work: Sequence[_Item]) -> Iterator[_Result]:
+        def piece(i: int) -> _Result:
+            self._within.is_worker = True
+            return function(work[i])
+
+        context = multiprocessing.get_context("fork")
+        is_over = context.Event()
+        pool = ProcessPoolExecutor(
+            min(self.n_workers, len(work)),
+            context,
+            initializer=_begin_work,
+            initargs=(piece, os.getpid(), is_over),
+        )
+        try:
+            with warnings.catch_warnings():
+                # Threads of this process wait for work while it is copied, and hold nothing that a copy needs.
+                warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
+                results = pool.map(_done, range(len(work)))
+            yield from results
+        except BaseException:
+            is_over.set()
+            raise
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _begin_work(piece: Callable[[int], Any], parent: int, is_over: Event) -> None:
+    global _piece
+    _piece = piece
+    # Who interrupts a command means the process that he has begun, which ends its workers.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    threading.Thread(target=_end_with, args=(parent, is_over), daemon=True).start()
+
+
+def _end_with(parent: int, is_over: Event) -> None:
+    """End this process in the middle of its work when that is of no use, or its parent has ended, however."""
+    while os.getppid() == parent and not is_over.wait(_PERIOD_S):
+        pass
+    os._exit(1)
+
+
+def _done(i: int) -> Any:
+    assert _piece is not None  # set before the first piece
+    return _piece(i)
+
+
+def _n_cores() -> int:
+    # not on every system: where it is absent, all cores may be used
+    allowed = getattr(os, "sched_getaffinity", None)
+    return len(allowed(0)) if allowed else os.cpu_count() or 1

@@ -1,0 +1,134 @@
+"""Workers that share work: results in order, work within work, errors, and workers that are left alone."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from pipelines.diagnosis.workers import FORKS, Workers
+from sloshlab.errors import AnalysisError
+from sloshlab.identification.effort import Effort
+from sloshlab.twin.lane_preparation import Executor, InTurn
+
+
+@pytest.mark.parametrize("n_workers", [1, 2, 5])
+def test_results_are_in_the_order_of_the_items(n_workers: int) -> None:
+    assert Workers(n_workers).map(lambda n: n * n, range(20)) == [n * n for n in range(20)]
+
+
+def test_as_many_work_at_once_as_there_are_workers() -> None:
+    """Each waits for all the others, which would end in a broken barrier if they came one after the other."""
+    together = threading.Barrier(3, timeout=20.0)
+    assert sorted(Workers(3).map(lambda _: together.wait(), range(3))) == [0, 1, 2]
+
+
+def test_work_that_shares_work_itself_waits_for_nobody() -> None:
+    threads = Workers(2)
+
+    def inner(n: int) -> tuple[int, int]:
+        return n, threading.get_ident()
+
+    found = threads.map(lambda n: (threading.get_ident(), threads.map(inner, range(n, n + 3))), range(6))
+    for first, (worker, own) in enumerate(found):
+        assert own == [(first + i, worker) for i in range(3)]
+
+
+def test_an_error_of_the_work_is_raised() -> None:
+    with pytest.raises(ZeroDivisionError):
+        Workers(2).map(lambda n: 1 // n, [1, 0, 2])
+
+
+@pytest.mark.parametrize("n_workers", [1, 2, 3])
+def test_results_of_processes_are_in_the_order_of_the_items(n_workers: int) -> None:
+    """Functions within functions and what they enclose need not be told to a copy of this process."""
+    squares = {n: n * n for n in range(20)}
+    assert list(Workers(n_workers).map_apart(lambda n: squares[n], range(20))) == list(squares.values())
+
+
+@pytest.mark.skipif(not FORKS, reason="no copies of processes here")
+def test_long_pieces_are_done_by_processes_and_what_is_within_them_in_turn() -> None:
+    workers = Workers(2)
+    found = list(
+        workers.map_apart(lambda _: (os.getpid(), set(workers.map_apart(lambda _: os.getpid(), range(3)))), range(8))
+    )
+    assert os.getpid() not in {process for process, _ in found}
+    assert all(within == {process} for process, within in found)
+
+
+def test_an_error_in_a_process_is_raised() -> None:
+    with pytest.raises(AnalysisError, match="run 7"):
+        list(Workers(2).map_apart(_refused, range(8)))
+
+
+def _refused(n: int) -> int:
+    if n == 7:
+        raise AnalysisError(f"run {n}", got="no end")
+    return n
+
+
+@pytest.mark.skipif(not FORKS, reason="no copies of processes here")
+def test_an_error_ends_the_pieces_that_others_are_at(tmp_path: Path) -> None:
+    """One fails at once, the other would take a minute: nobody waits for it, and it does not go on."""
+
+    def piece(n: int) -> int:
+        if n == 0:
+            while not (tmp_path / "begun").exists():
+                time.sleep(0.01)
+            return 1 // n
+        (tmp_path / "begun").write_text(str(os.getpid()))
+        time.sleep(60.0)
+        return n
+
+    began = time.monotonic()
+    with pytest.raises(ZeroDivisionError):
+        list(Workers(2).map_apart(piece, range(2)))
+    assert time.monotonic() - began < 30.0
+    assert not Path(f"/proc/{(tmp_path / 'begun').read_text()}").exists()
+
+
+@pytest.mark.skipif(not FORKS, reason="no copies of processes here")
+def test_processes_end_with_the_one_they_work_for(tmp_path: Path) -> None:
+    """It is killed without a chance to tell them."""
+    script = (
+        "import os, pathlib, time\n"
+        "from pipelines.diagnosis.workers import Workers\n"
+        f"folder = pathlib.Path({str(tmp_path)!r})\n"
+        "def piece(n):\n"
+        "    (folder / f'{os.getpid()}').touch()\n"
+        "    time.sleep(60.0)\n"
+        "list(Workers(2).map_apart(piece, range(2)))\n"
+    )
+    parent = subprocess.Popen([sys.executable, "-c", script])
+    try:
+        within(20.0, lambda: len(list(tmp_path.iterdir())) == 2)
+    finally:
+        parent.kill()
+        parent.wait()
+    within(20.0, lambda: not any(Path(f"/proc/{worker.name}").exists() for worker in tmp_path.iterdir()))
+
+
+def within(timeout_s: float, holds: Callable[[], bool]) -> None:
+    """Wait until something holds."""
+    end = time.monotonic() + timeout_s
+    while not holds():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize("executor", [InTurn(), Workers(2)], ids=["in turn", "processes"])
+def test_what_is_simulated_anywhere_counts(executor: Executor) -> None:
+    effort = Effort()
+
+    def piece(n: int) -> int:
+        effort.add(n)
+        return n
+
+    assert list(effort.spent_on(executor, piece, range(10))) == list(range(10))
+    assert effort.n_readings == sum(range(10))
