@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final, TypeVar
 
+import numpy as np
 from numba import njit, typeof
 
 _F = TypeVar("_F", bound=Callable[..., Any])
@@ -35,7 +36,31 @@ def inlined(function: _F) -> _F:
 
 def address_of(function: Callable[..., Any], *arguments: Any) -> int:
     """Where a `called` or `inlined` function is that was compiled for the types of these arguments."""
-    given = tuple(typeof(argument) for argument in arguments)
-    function.compile(given)  # type: ignore[attr-defined]
-    compiled = function.overloads[given]  # type: ignore[attr-defined]
-    return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
+    key = (function, *map(_form_of, arguments))
+    if key not in _addresses:
+        given = tuple(typeof(argument) for argument in arguments)
+        function.compile(given)  # type: ignore[attr-defined]
+        compiled = function.overloads[given]  # type: ignore[attr-defined]
+        _addresses[key] = int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
+    return _addresses[key]
+
+
+_addresses: Final[dict[tuple[Any, ...], int]] = {}
+"""By function and forms of its arguments: to ask for their types takes longer than a simulation of seconds."""
+
+
+def _form_of(argument: Any) -> Any:
+    """What tells the type for which something is compiled."""
+    if isinstance(argument, tuple):
+        return (type(argument), *map(_form_of, argument))
+    if isinstance(argument, np.ndarray):
+        flags = argument.flags
+        return (
+            argument.dtype,
+            argument.ndim,
+            flags.c_contiguous,
+            flags.f_contiguous,
+            flags.aligned,
+            flags.writeable,
+        )
+    return type(argument)

@@ -56,7 +56,9 @@ def test_results_of_processes_are_in_the_order_of_the_items(n_workers: int) -> N
 def test_long_pieces_are_done_by_processes_and_what_is_within_them_in_turn() -> None:
     workers = Workers(2)
     found = list(
-        workers.map_apart(lambda _: (os.getpid(), set(workers.map_apart(lambda _: os.getpid(), range(3)))), range(8))
+        workers.map_apart(
+            lambda _: (os.getpid(), set(workers.map_apart(lambda _: os.getpid(), range(3)))), range(8)
+        )
     )
     assert os.getpid() not in {process for process, _ in found}
     assert all(within == {process} for process, within in found)
