@@ -21,6 +21,8 @@ _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
 FORKS: Final = sys.platform == "linux"
 """Whether a process may go on from a copy of another one: not where system libraries forbid it."""
+_MOST_BYTES: Final = 2 * 1024**3
+"""Of all copies; a process that has needed half of it, for recordings of many minutes, makes none."""
 _PERIOD_S: Final = 1.0
 """Of looking whether the process for which a worker works is still there."""
 _piece: Callable[[int], Any] | None = None
@@ -66,13 +68,16 @@ class Workers:
         work = list(items)
         if self._is_in_turn(len(work)):
             return map(function, work)
-        return self._by_processes(function, work) if FORKS else self.map(function, work)
+        n_processes = min(self.n_workers, len(work), _most_copies())
+        return self._by_processes(n_processes, function, work) if n_processes > 1 else self.map(function, work)
 
     def _is_in_turn(self, n_items: int) -> bool:
         # a worker that waited for others of the same pool could wait for ever
         return self.n_workers == 1 or n_items < 2 or getattr(self._within, "is_worker", False)
 
-    def _by_processes(self, function: Callable[[_Item], _Result], work: Sequence[_Item]) -> Iterator[_Result]:
+    def _by_processes(
+        self, n_processes: int, function: Callable[[_Item], _Result], work: Sequence[_Item]
+    ) -> Iterator[_Result]:
         def piece(i: int) -> _Result:
             self._within.is_worker = True
             return function(work[i])
@@ -80,7 +85,7 @@ class Workers:
         context = multiprocessing.get_context("fork")
         is_over = context.Event()
         pool = ProcessPoolExecutor(
-            min(self.n_workers, len(work)),
+            n_processes,
             context,
             initializer=_begin_work,
             initargs=(piece, os.getpid(), is_over),
@@ -117,6 +122,16 @@ def _end_with(parent: int, is_over: Event) -> None:
 def _done(i: int) -> Any:
     assert _piece is not None  # set before the first piece
     return _piece(i)
+
+
+def _most_copies() -> int:
+    """Copies of this process that may be made: each may come to need as much memory as this one has needed."""
+    if not FORKS:
+        return 0
+    # not on every system
+    import resource
+
+    return int(_MOST_BYTES / (1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss))
 
 
 def _n_cores() -> int:

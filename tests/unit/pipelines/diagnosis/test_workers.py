@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from pipelines.diagnosis import workers
 from pipelines.diagnosis.workers import FORKS, Workers
 from sloshlab.errors import AnalysisError
 from sloshlab.identification.effort import Effort
@@ -62,6 +63,11 @@ def test_long_pieces_are_done_by_processes_and_what_is_within_them_in_turn() -> 
     )
     assert os.getpid() not in {process for process, _ in found}
     assert all(within == {process} for process, within in found)
+
+
+def test_a_large_process_is_not_copied(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workers, "_MOST_BYTES", 1024**2)
+    assert set(Workers(2).map_apart(lambda _: os.getpid(), range(4))) == {os.getpid()}
 
 
 def test_an_error_in_a_process_is_raised() -> None:
