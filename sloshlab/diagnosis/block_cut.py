@@ -17,11 +17,10 @@ from sloshlab.diagnosis.inference.places import SENSOR, block_of
 from sloshlab.diagnosis.inference.run_noise import run_noise
 from sloshlab.identification.diagnosed_model import DiagnosedModel
 from sloshlab.identification.observations import Observation
-from sloshlab.missing_force.interface_cut import BlockCut, InterfaceCut
+from sloshlab.missing_force.interface_cut import N_DRAWS, BlockCut, InterfaceCut
 from sloshlab.missing_physics.extension import NOTHING
 
 FloatArray = NDArray[np.float64]
-_N_DRAWS: Final = 400
 _FED_WITH: Final = {
     "aerodynamics": "measured motion of the wing",
     "tank": "measured acceleration of the tank",
@@ -75,7 +74,7 @@ def block_cut(
 def _cuts(explained: Mapping[str, FloatArray], total: FloatArray, seed: int) -> tuple[BlockCut, ...]:
     """Of every block its best place, with an interval by drawing runs with replacement."""
     generator = np.random.default_rng(seed)
-    drawn = generator.integers(0, max(total.size, 1), (_N_DRAWS, max(total.size, 1)))
+    drawn = generator.integers(0, max(total.size, 1), (N_DRAWS, max(total.size, 1)))
     best: dict[str, tuple[float, str]] = {}
     for place, own in explained.items():
         share = _share(float(own.sum()), float(total.sum()))

@@ -44,8 +44,8 @@ Half of all simulations were of refused steps that damping made ever smaller.
 """
 _N_DRAWN: Final = 32
 """Starts drawn from the prior."""
-_N_REFINED: Final = 2
-"""Of these, the best ones that are fitted."""
+N_REFINED: Final = 2
+"""Of drawn starts, the best ones that are fitted."""
 _ABANDON_COST_RATIO: Final = 1.02
 """Cost after the first stages, over the best one so far, beyond which another start is abandoned."""
 _LARGEST_INFLATION_RATIO: Final = 1.5
@@ -321,7 +321,7 @@ def fitted_baseline(
     draws = np.tile(problem.theta_of(best[0].values), (_N_DRAWN, 1))
     draws[:, : problem.n_baseline][:, problem.changes_motion] = drawn[:, problem.changes_motion]
     costs = costs_at(problem, [problem.values(draw) for draw in draws], inflation)
-    for place in np.argsort(costs)[:_N_REFINED]:
+    for place in np.argsort(costs)[:N_REFINED]:
         other = fitted(problem, problem.values(draws[place]), n_iterations=n_iterations, stages=(inflation,))
         if other[0].trouble or inflated_cost(problem, other[0], inflation) > _ABANDON_COST_RATIO * reached:
             continue

@@ -34,6 +34,8 @@ TEMPERING: Final = 10.0
 """Factor by which log-likelihoods are too large: coefficients of a cell share what is wrong with their noise."""
 DOWN_TO_NOISE: Final = 1.15
 """Mean square of the weighted residuals of a channel up to which nothing but noise is left."""
+NEAR_A_BOUND: Final = 1e-6
+"""Of a range: scaled numbers reach a bound only to rounding."""
 _MOST_BYTES_AT_ONCE: Final = 3e7
 """Of the readings of simulations that are weighted together; results do not depend on it.
 
@@ -200,8 +202,7 @@ class FreeRunProblem:
     def at_bounds(self, theta: FloatArray) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Which parameters are as small as they may be, and which as large."""
         physical = self.centres + theta * self.scales
-        # To a relative tolerance: scaled values reach a bound only to rounding.
-        near = 1e-6 * (self.high - self.low)
+        near = NEAR_A_BOUND * (self.high - self.low)
         return physical <= self.low + near, physical >= self.high - near
 
     def residual(self, theta: FloatArray) -> FloatArray:

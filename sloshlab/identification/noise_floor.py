@@ -33,7 +33,7 @@ from sloshlab.missing_physics.extension import NOTHING
 FloatArray = NDArray[np.float64]
 _N_NOISE_DRAWS: Final = 4
 """Simulations with other noise, over which squares are averaged."""
-_N_BLOCKS: Final = 9
+N_BLOCKS: Final = 9
 """Over which squares are averaged: noise through a resonance is steady."""
 _DOMINANT_NOISE_RATIO: Final = 1.0
 """Variance by the noise of drives over that of the sensor itself, from which the former dominates."""
@@ -236,7 +236,7 @@ def _over_bands_of_a_resonance(square: FloatArray) -> FloatArray:
     """
     # A smear over neighbouring bands instead was tried: fits moved modes out of the compared bands, damped them
     # and lessened their share in the motion of the base.
-    steady = uniform_filter(square, (_N_BLOCKS, 1), mode="nearest")
+    steady = uniform_filter(square, (N_BLOCKS, 1), mode="nearest")
     bands = np.arange(square.shape[1])
     reach = np.ceil(_RELATIVE_REACH * (bands + 0.5)).astype(int)
     return np.stack(

@@ -32,7 +32,8 @@ FloatArray = NDArray[np.float64]
 SENSOR: Final = "sensor"
 _N_PARTS: Final = 6
 """Stretches of a run that are resampled as wholes (block bootstrap)."""
-_N_DRAWS: Final = 400
+N_DRAWS: Final = 400
+"""Of shares of blocks, for their intervals."""
 _CONSISTENT: Final = 1.4
 """RMS over noise up to which channels of one motion agree."""
 _EXPLAINED: Final = 0.35
@@ -405,7 +406,7 @@ def _shares(parts: Sequence[Mapping[str, FloatArray]], seed: int) -> dict[str, t
     best = share(np.arange(table.shape[1]))
     generator = np.random.default_rng(seed)
     # Block bootstrap: whole stretches of all runs are drawn, as residuals within one are not independent.
-    draws = [share(np.asarray(generator.integers(0, table.shape[1], table.shape[1]))) for _ in range(_N_DRAWS)]
+    draws = [share(np.asarray(generator.integers(0, table.shape[1], table.shape[1]))) for _ in range(N_DRAWS)]
     low, high = np.nanquantile(np.array(draws), (0.05, 0.95), axis=0) if np.isfinite(best).all() else (best, best)
     return {
         name: (float(estimate), min(float(a), float(estimate)), max(float(b), float(estimate)))

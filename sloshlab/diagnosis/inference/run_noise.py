@@ -21,17 +21,15 @@ from scipy.ndimage import uniform_filter1d
 
 from sloshlab.diagnosis.inference.places import ELSEWHERE, SENSOR, STRUCTURE, TANK, transfers_of
 from sloshlab.identification.diagnosed_model import EXACT, DiagnosedModel, ModelOfBlocks
+from sloshlab.identification.noise_floor import N_BLOCKS
 from sloshlab.identification.observations import Observation
 from sloshlab.identification.rig_model import RigModel
 
 FloatArray = NDArray[np.float64]
-BLOCKS_OF_A_CELL: Final = 4
-BANDS_OF_A_CELL: Final = 4
-"""Two seconds and four hertz of the transform, within which powers and correlations are constant."""
+_CELL: Final = (4, 4)
+"""Blocks and bands, two seconds and four hertz, within which powers and correlations are constant."""
 _EXACT_BESIDE_CHAOS: Final = 0.05
-"""The same where a liquid moves chaotically: to this its damping is believed to be that of the run's mean."""
-_STEADY_BLOCKS: Final = 9
-"""Over which products of draws are averaged, as their squares are in the noise floor."""
+"""As `EXACT`, where a liquid moves chaotically: to this its damping is believed to be that of the mean."""
 _LARGEST_CORRELATION: Final = 0.95
 """Of the noise of two channels: sensors have noise of their own, which draws of the drive's do not contain."""
 
@@ -121,7 +119,7 @@ def _covariance(observed: Sequence[Observation]) -> FloatArray:
 
 def _steady(drawn: FloatArray) -> FloatArray:
     """Mean over draws and neighbouring blocks, band by band: noise through a resonance is steady and narrow."""
-    return np.asarray(uniform_filter1d(drawn.mean(axis=0), _STEADY_BLOCKS, axis=0, mode="nearest"))
+    return np.asarray(uniform_filter1d(drawn.mean(axis=0), N_BLOCKS, axis=0, mode="nearest"))
 
 
 def _projections(directions: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -139,5 +137,5 @@ def _projections(directions: FloatArray) -> tuple[FloatArray, FloatArray]:
 def sums_of_cells(values: FloatArray) -> FloatArray:
     """Sums over the cells of time and frequency; the last two axes are blocks and bands."""
     n_blocks, n_bands = values.shape[-2:]
-    by_time = np.add.reduceat(values, np.arange(0, n_blocks, BLOCKS_OF_A_CELL), axis=-2)
-    return np.asarray(np.add.reduceat(by_time, np.arange(0, n_bands, BANDS_OF_A_CELL), axis=-1))
+    by_time = np.add.reduceat(values, np.arange(0, n_blocks, _CELL[0]), axis=-2)
+    return np.asarray(np.add.reduceat(by_time, np.arange(0, n_bands, _CELL[1]), axis=-1))

@@ -21,16 +21,13 @@ from numpy.typing import NDArray
 from sloshlab.diagnosis.inference.remainder import Remainder, remainder
 from sloshlab.diagnosis.inference.thresholds import LEAST_STRENGTH
 from sloshlab.diagnosis.inference.whitened import WhitenedRun
-from sloshlab.identification.free_run_problem import HUBER_LIMIT, TEMPERING, FreeRunFit
+from sloshlab.identification.free_run_problem import HUBER_LIMIT, NEAR_A_BOUND, TEMPERING, FreeRunFit
 from sloshlab.missing_physics.candidate import channels_of
 from sloshlab.missing_physics.prior import ParameterPrior
 
 FloatArray = NDArray[np.float64]
 _FEWEST_COEFFICIENTS: Final = 50
 """Below it a mean square is too uncertain to be used: its standard error is a fifth."""
-
-_NEAR_AN_END: Final = 1e-6
-"""Of a range: scaled numbers reach an end only to rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +149,7 @@ def _n_at_ends(fit: FreeRunFit) -> int:
     for candidate in fit.candidates:
         for parameter in candidate.effect.parameters:
             low, high = candidate.bounds(parameter)
-            value, near = fit.values[f"{candidate.key}.{parameter.name}"], _NEAR_AN_END * (high - low)
+            value, near = fit.values[f"{candidate.key}.{parameter.name}"], NEAR_A_BOUND * (high - low)
             n += parameter.name not in candidate.sizes and not low + near < value < high - near
     return n
 

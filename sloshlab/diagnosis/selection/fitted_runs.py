@@ -13,17 +13,17 @@ import numpy as np
 from sloshlab.diagnosis.selection.missing_forces import latent_forces, missing_forces
 from sloshlab.identification.diagnosed_model import DiagnosedModel
 from sloshlab.identification.effort import Effort
-from sloshlab.identification.free_run_fit import fitted, fitted_baseline
+from sloshlab.identification.free_run_fit import N_REFINED, fitted, fitted_baseline
 from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, run_of
 from sloshlab.identification.observations import Observation, without_scatter
 from sloshlab.missing_physics.candidate import Candidate
 from sloshlab.missing_physics.prior import drawn
 
 Runs = Sequence[Sequence[Observation]]
-_DRAWS_PER_SCALE: Final = 6
-"""Places of what an effect has of its own in a run, for each of its scales: six instants of a pulse a period."""
-_N_REFINED: Final = 2
-"""Of these, the best ones that are refined."""
+DRAWS_PER_NUMBER: Final = 6
+"""Quasi-random starts for each number of an effect; of what it has of its own in a run, for each of its scales:
+six instants of a pulse a period.
+"""
 _N_HALVINGS: Final = 6
 """Of the distance of two places: to half a millisecond."""
 
@@ -136,7 +136,7 @@ def _best_started(problem: FreeRunProblem, start: dict[str, float], fit: FreeRun
     priors = [prior for candidate in problem.candidates for prior in candidate.prior if prior.name in spacings]
     n_drawn = max((prior.high - prior.low) / spacings[prior.name] for prior in priors)
     draws = drawn(priors, ceil(n_drawn))
-    best = np.argsort(problem.costs([{**start, **numbers} for numbers in draws]))[:_N_REFINED]
+    best = np.argsort(problem.costs([{**start, **numbers} for numbers in draws]))[:N_REFINED]
     places = [start, *({**start, **numbers} for numbers in (*shown, *(draws[i] for i in best)))]
     return _refined(problem, places, spacings)
 
@@ -153,7 +153,7 @@ def places_in_runs(problem: FreeRunProblem, candidate: Candidate) -> dict[str, f
     candidate : Candidate
     """
     return {
-        name: candidate.scale(known.name) / _DRAWS_PER_SCALE
+        name: candidate.scale(known.name) / DRAWS_PER_NUMBER
         for known in candidate.effect.parameters
         if known.name not in candidate.sizes
         and (name := f"{candidate.key}.{known.name}") in problem.names

@@ -27,8 +27,6 @@ from sloshlab.missing_physics.candidate import Candidate
 FloatArray = NDArray[np.float64]
 _SMALL: Final = 1e-3
 """Of the size at which an effect starts: a mass that moves a frequency by percents is not linear over a run."""
-_SIZES: Final = (_SMALL, 2 * _SMALL, 3 * _SMALL)
-"""From which the slope at no size is told: to the third order."""
 _LEAST_LIFT: Final = 1e-9
 """Of a diagonal that is added to it, so that it can be inverted."""
 _N_REWEIGHTED: Final = 8
@@ -105,16 +103,17 @@ def hidden_effects(
         def slope(one: FloatArray, two: FloatArray, three: FloatArray) -> FloatArray:
             if not all(np.isfinite(each).all() for each in (one, two, three)):
                 return np.full(one.size, np.inf)
-            # At no size, but not from there: beside an effect on an accelerometer another one may drive.
+            # To the third order at no size, but not from there: beside an effect on an accelerometer another one may
+            # drive.
             return np.asarray((8 * two - 5 * one - 3 * three) / (2 * _SMALL))
 
         starts = _directions(candidate, places)
         if not (fit.candidates and candidate.effect.block == "sensor"):
             # One size tells the slope well enough to see what is far from the gain that is asked for.
-            changes = ((start, (at - about.residual) / _SMALL) for start, [at] in moved(starts, _SIZES[:1]))
+            changes = ((start, (at - about.residual) / _SMALL) for start, [at] in moved(starts, [_SMALL]))
             by_one = [(start, hidden(start, change)) for start, change in changes]
             starts = [start for start, each in by_one if each is not None and each[1] > 0.5 * least]
-        slopes = (slope(*of_sizes) for _, of_sizes in moved(starts, _SIZES))
+        slopes = (slope(*of_sizes) for _, of_sizes in moved(starts, [_SMALL, 2 * _SMALL, 3 * _SMALL]))
         found = [hidden(start, change) for start, change in zip(starts, slopes, strict=True)]
         return max((each for each in found if each is not None), key=lambda each: each[1], default=None)
 

@@ -27,8 +27,9 @@ N_KEPT: Final = 4
 one is known that explains as much, so that the others are only compared with it."""
 _BUDGET: Final = 6e8
 """Readings that may be simulated, two minutes on two cores; what is begun is finished, no more is begun."""
-_LEAST_EXPLAINED: Final = 0.1
-"""Of what is left beyond noise, that the last effect of the best model explains if the search is to add others.
+LEAST_EXPLAINED: Final = 0.1
+"""Of what is left beyond noise, that a force explains if a fit is to start from there, and the last effect of the
+best model if the search is to add others.
 
 Two effects that explain all of it together, and neither a tenth of it alone, would act only together.
 """
@@ -163,7 +164,7 @@ class KnownFits:
         if before is None or after is None:
             return False
         left = before.misfit - self.runs.n_coefficients
-        return left > 0 and before.misfit - after.misfit < _LEAST_EXPLAINED * left
+        return left > 0 and before.misfit - after.misfit < LEAST_EXPLAINED * left
 
     def leaves_less(self, runs: FittedRuns, coarse: FreeRunFit, inflation: float) -> bool:
         """Whether a fit of the same model is known that leaves less in the same noise than a coarse one.

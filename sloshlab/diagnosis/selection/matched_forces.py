@@ -4,21 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final
 
 import numpy as np
 
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
+from sloshlab.diagnosis.selection.known_fits import LEAST_EXPLAINED
 from sloshlab.diagnosis.selection.proposals import Places, missing_from
-from sloshlab.diagnosis.selection.successive_halving import HOPELESS_COST_RATIO
+from sloshlab.diagnosis.selection.successive_halving import HOPELESS_COST_RATIO, N_ALIKE
 from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.missing_force.force_matching import ForceMatching, Match, force_alone, matchings
 from sloshlab.missing_physics.candidate import Candidate, Numbers
-
-_N_STARTS: Final = 2
-"""Of a match, from which a fit may be begun."""
-_LEAST_MATCHED: Final = 0.1
-"""Of what is missing at a place, that a force explains if it is to start from there."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +47,7 @@ class MatchedForces:
         nearer = [
             candidate
             for candidate in leading
-            if matches.of[candidate.key][0].misfit < (1.0 - _LEAST_MATCHED) * before[candidate.key]
+            if matches.of[candidate.key][0].misfit < (1.0 - LEAST_EXPLAINED) * before[candidate.key]
         ]
         return matches.found(nearer)
 
@@ -112,7 +107,7 @@ class _Matches:
         """
         return MatchedForces(
             {
-                key: [match.numbers for match in matches[:_N_STARTS] if match.misfit < 1.0 - _LEAST_MATCHED]
+                key: [match.numbers for match in matches[:N_ALIKE] if match.misfit < 1.0 - LEAST_EXPLAINED]
                 for key, matches in self.of.items()
             },
             {candidate.key: self.left(candidate) for candidate in self.candidates if self.is_compared(candidate)},
@@ -162,7 +157,7 @@ class _Matches:
     def explains(self, candidate: Candidate) -> bool:
         """Whether it explains some of what is missing at its place."""
         matches = self.of.get(candidate.key)
-        return matches is not None and matches[0].misfit < 1.0 - _LEAST_MATCHED
+        return matches is not None and matches[0].misfit < 1.0 - LEAST_EXPLAINED
 
     def is_compared(self, candidate: Candidate) -> bool:
         """Whether what it leaves says how good it is: all, where no more than noise is missing at its place."""

@@ -11,26 +11,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sloshlab.diagnosis.score_test import ScoreTest
-from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
+from sloshlab.diagnosis.selection.fitted_runs import DRAWS_PER_NUMBER, FittedRuns
 from sloshlab.diagnosis.selection.missing_forces import latent_forces, missing_forces
 from sloshlab.diagnosis.surroundings import ACROSS_A_BAND, residual_peaks_hz
 from sloshlab.identification.block_jacobian import BlockJacobian
 from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost
 from sloshlab.missing_force.latent_force import RunForces
 from sloshlab.missing_physics.candidate import Candidate, MissingForces
+from sloshlab.twin.lane_vector import N_LANES
 
 FloatArray = NDArray[np.float64]
 _Promise = tuple[dict[str, float], tuple[float, ...]]
 """Of a proposal, the start and what is predicted."""
 NO_STARTS: Final[Mapping[str, Sequence[Mapping[str, float]]]] = {}
-_DRAWS_PER_NUMBER: Final = 6
-"""Quasi-random starts from the prior of an effect, for each of its numbers; those of single runs count once."""
 _MOST_STEP: Final = 3.0
 """Factor up to which a size follows the linear step: about the spacing of the sizes that are tried."""
-
-
-_N_AT_ONCE: Final = 8
-"""Starts that are tested together, so that few residuals are held at once; results change by rounding alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +155,8 @@ def _beside(
         own = [i for i, name in enumerate(extended.names) if name.startswith(f"{candidate.key}.")]
         moved = zip(sets, extended.residuals_moved(thetas, own, residual), strict=True)
         found: list[_Promise] = []
-        while some := list(islice(moved, _N_AT_ONCE)):
+        # As many as are simulated together, so that few residuals are held at once.
+        while some := list(islice(moved, N_LANES)):
             # A start that explodes is no reason to drop the candidate as long as another one runs.
             found += promised(candidate, [(start, at) for start, at in some if np.isfinite(at).all()])
         return found
@@ -233,7 +229,8 @@ class Places:
         own = [*here.starts(), *candidate.proposed(self.missing)]
         if promising is not None:
             return [*own, *map(dict, promising)]
-        n = _DRAWS_PER_NUMBER * len(candidate.effect.kinds_of_numbers)
+        # Numbers of single runs count once.
+        n = DRAWS_PER_NUMBER * len(candidate.effect.kinds_of_numbers)
         return [*own, *candidate.drawn(n)[1:]]
 
 

@@ -19,10 +19,11 @@ from sloshlab.identification.free_run_problem import TEMPERING, FreeRunFit
 
 _STEPS_OF_A_RUNG: Final = 3
 """Of a fit before it is compared with the others."""
-_STARTS_OF_A_MODEL: Final = 2
-"""That may go on beside each other."""
-_MODELS_OF_A_NAME: Final = 2
-"""That go on beside each other: forms and places of one effect predict nearly the same; others need the room."""
+N_ALIKE: Final = 2
+"""Starts of a model, and models of a name, that go on beside each other.
+
+Forms and places of one effect predict nearly the same; others need the room.
+"""
 HOPELESS_COST_RATIO: Final = 3.0
 """Cost over the lowest one at the same noise: what is its equal is no further behind after three steps."""
 NO_CHANCE: Final = 7.0
@@ -74,7 +75,7 @@ def halved(
             fit = replace(fit, candidates=each.proposal.candidates)
             done.append(_Running(each.proposal, fit.values, fit, cost))
         is_last = rung == len(stages) - 1
-        running = _better(done, n_kept * 2 ** (len(stages) - 1 - rung), 1 if is_last else _STARTS_OF_A_MODEL)
+        running = _better(done, n_kept * 2 ** (len(stages) - 1 - rung), 1 if is_last else N_ALIKE)
     return [each.fit for each in running if each.fit is not None]
 
 
@@ -86,7 +87,7 @@ def _best_starts(proposed: Sequence[Proposal], n: int) -> list[Proposal]:
         n_ranked, of_model, of_name = 0, Counter[frozenset[str]](), Counter[str]()
         for i in np.argsort([proposal.predicted[k] for proposal in proposed], kind="stable"):
             keys, name = proposed[i].keys, proposed[i].candidates[-1].effect.known_as
-            if of_model[keys] < _STARTS_OF_A_MODEL and of_name[name] < _MODELS_OF_A_NAME * _STARTS_OF_A_MODEL:
+            if of_model[keys] < N_ALIKE and of_name[name] < N_ALIKE**2:
                 n_ranked, of_model[keys], of_name[name] = n_ranked + 1, of_model[keys] + 1, of_name[name] + 1
                 rank[i] = min(rank[i], n_ranked)
     return [proposed[i] for i in np.argsort(rank, kind="stable")[:n] if np.isfinite(rank[i])]
@@ -115,7 +116,7 @@ def _better(running: Sequence[_Running], n: int, of_a_model: int) -> list[_Runni
         keys, name = each.proposal.keys, each.proposal.candidates[-1].effect.known_as
         if not np.isfinite(each.cost) or each.cost > most:
             break
-        if taken[keys] < of_a_model and of_name[name] < _MODELS_OF_A_NAME * of_a_model:
+        if taken[keys] < of_a_model and of_name[name] < N_ALIKE * of_a_model:
             taken[keys], of_name[name] = taken[keys] + 1, of_name[name] + 1
             kept.append(each)
     return kept[:n]
