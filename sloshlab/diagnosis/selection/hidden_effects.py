@@ -103,8 +103,8 @@ def hidden_effects(
         def slope(one: FloatArray, two: FloatArray, three: FloatArray) -> FloatArray:
             if not all(np.isfinite(each).all() for each in (one, two, three)):
                 return np.full(one.size, np.inf)
-            # To the third order at no size, but not from there: beside an effect on an accelerometer another one may
-            # drive.
+            # To the third order at no size, but not from there: beside an effect on an accelerometer another one
+            # may drive.
             return np.asarray((8 * two - 5 * one - 3 * three) / (2 * _SMALL))
 
         starts = _directions(candidate, places)
