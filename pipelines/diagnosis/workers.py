@@ -11,11 +11,15 @@ import os
 import signal
 import sys
 import threading
+import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from multiprocessing.synchronize import Event
-from typing import Any, Final, TypeVar
+from concurrent.futures import ThreadPoolExecutor
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import ForkProcess
+from typing import Any, Final, TypeVar, cast
+
+from sloshlab.errors import AnalysisError
 
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
@@ -25,8 +29,6 @@ _MOST_BYTES: Final = 2 * 1024**3
 """Of all copies; a process that has needed half of it, for recordings of many minutes, makes none."""
 _PERIOD_S: Final = 1.0
 """Of looking whether the process for which a worker works is still there."""
-_piece: Callable[[int], Any] | None = None
-"""Of a worker process: its work by number."""
 
 
 class Workers:
@@ -82,46 +84,107 @@ class Workers:
             self._within.is_worker = True
             return function(work[i])
 
-        context = multiprocessing.get_context("fork")
-        is_over = context.Event()
-        pool = ProcessPoolExecutor(
-            n_processes,
-            context,
-            initializer=_begin_work,
-            initargs=(piece, os.getpid(), is_over),
-        )
+        copies = _Copies(n_processes, piece)
         try:
+            yield from copies.results(len(work))
+        finally:
+            copies.end()
+
+
+class _Copies:
+    """Processes that begin as copies of this one, each at the other end of a pipe of its own.
+
+    With queues in common one that is killed while it holds their lock would stop all others for ever.
+    """
+
+    def __init__(self, n: int, piece: Callable[[int], Any]) -> None:
+        context = multiprocessing.get_context("fork")
+        self._processes: dict[Connection, ForkProcess] = {}
+        for _ in range(n):
+            own, other = context.Pipe()
+            ends = [*self._processes, own]
+            process = context.Process(target=_work, args=(piece, other, ends, os.getpid()), daemon=True)
             with warnings.catch_warnings():
                 # Threads of this process wait for work while it is copied, and hold nothing that a copy needs.
                 warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
-                results = pool.map(_done, range(len(work)))
-            yield from results
-        except BaseException:
-            is_over.set()
-            raise
-        finally:
-            pool.shutdown(cancel_futures=True)
+                process.start()
+            other.close()
+            self._processes[own] = process
+
+    def results(self, n_pieces: int) -> Iterator[Any]:
+        """Results in the order of their numbers; an error of one is raised.
+
+        Raises
+        ------
+        AnalysisError
+            If a process ends before its work does.
+        """
+        numbers, found = iter(range(n_pieces)), dict[int, Any]()
+        busy = set[Connection]()
+
+        def give(end: Connection) -> None:
+            i = next(numbers, None)
+            if i is None:
+                busy.discard(end)
+            else:
+                busy.add(end)
+                end.send(i)
+
+        def take(end: Connection) -> None:
+            i, error, found[i] = end.recv()
+            if error is not None:
+                raise error
+
+        for end in self._processes:
+            give(end)
+        for expected in range(n_pieces):
+            while expected not in found:
+                for end in cast(list[Connection], wait(busy)):
+                    try:
+                        take(end)
+                        give(end)
+                    except (EOFError, BrokenPipeError, ConnectionResetError):
+                        raise self._ended(end) from None
+            yield found.pop(expected)
+
+    def _ended(self, end: Connection) -> AnalysisError:
+        self._processes[end].join()
+        return AnalysisError(
+            "a process of the search",
+            got=f"ended with {self._processes[end].exitcode}",
+            remedy="more memory, or fewer cores (taskset)",
+        )
+
+    def end(self) -> None:
+        """End all of them, in the middle of their work as well."""
+        for process in self._processes.values():
+            process.kill()
+        for end, process in self._processes.items():
+            process.join()
+            end.close()
 
 
-def _begin_work(piece: Callable[[int], Any], parent: int, is_over: Event) -> None:
-    global _piece
-    _piece = piece
+def _work(piece: Callable[[int], Any], other: Connection, ends: Sequence[Connection], parent: int) -> None:
+    """Do pieces by their numbers as long as there are some."""
     # Who interrupts a command means the process that he has begun, which ends its workers.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    threading.Thread(target=_end_with, args=(parent, is_over), daemon=True).start()
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    for end in ends:
+        end.close()
+    while True:
+        i = other.recv()
+        try:
+            other.send((i, None, piece(i)))
+        except Exception as error:  # noqa: BLE001 - raised where the results are asked for
+            other.send((i, error, None))
 
 
-def _end_with(parent: int, is_over: Event) -> None:
-    """End this process in the middle of its work when that is of no use, or its parent has ended, however."""
-    while os.getppid() == parent and not is_over.wait(_PERIOD_S):
-        pass
+def _end_with(parent: int) -> None:
+    """End this process when its parent has ended, however that was."""
+    while os.getppid() == parent:
+        time.sleep(_PERIOD_S)
     os._exit(1)
-
-
-def _done(i: int) -> Any:
-    assert _piece is not None  # set before the first piece
-    return _piece(i)
 
 
 def _most_copies() -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -99,6 +100,19 @@ def test_an_error_ends_the_pieces_that_others_are_at(tmp_path: Path) -> None:
         list(Workers(2).map_apart(piece, range(2)))
     assert time.monotonic() - began < 30.0
     assert not Path(f"/proc/{(tmp_path / 'begun').read_text()}").exists()
+
+
+@pytest.mark.skipif(not FORKS, reason="no copies of processes here")
+def test_a_process_that_is_killed_is_said_in_one_line() -> None:
+    """As the system does where memory is short."""
+    with pytest.raises(AnalysisError, match="a process of the search: got ended with -9"):
+        list(Workers(2).map_apart(lambda n: os.kill(os.getpid(), signal.SIGKILL) if n == 5 else n, range(8)))
+
+
+@pytest.mark.skipif(not FORKS, reason="no copies of processes here")
+def test_results_that_cannot_be_sent_are_an_error() -> None:
+    with pytest.raises(AttributeError, match="lambda"):
+        list(Workers(2).map_apart(lambda _: lambda: 0, range(2)))
 
 
 @pytest.mark.skipif(not FORKS, reason="no copies of processes here")
