@@ -78,10 +78,11 @@ class TimeLeft:
         return [k for k in range(self._stage, len(starts)) if k <= self._stage + 1 or starts.index(starts[k]) == k]
 
     def seconds(self, now_s: float) -> float | None:
-        """Time left [s]; None where nothing tells yet."""
+        """Time left [s]; None where nothing tells yet, or it has taken longer than it usually takes."""
         if not self._whole_s:
             return None
-        return min(max(self._whole_s - (now_s - self._began_s), 0.0), LONGEST_S)
+        left_s = self._whole_s - (now_s - self._began_s)
+        return None if left_s < 0 else min(left_s, LONGEST_S)
 
 
 class WeightedSteps:

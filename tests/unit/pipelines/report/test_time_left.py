@@ -131,4 +131,4 @@ def test_another_step_begins_anew() -> None:
     time_left.at(24.0, 2, 8)
     assert time_left.seconds(24.0) == pytest.approx(12.0)
     assert time_left.seconds(30.0) == pytest.approx(6.0)
-    assert time_left.seconds(1000.0) == 0.0
+    assert time_left.seconds(1000.0) is None
