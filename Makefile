@@ -25,8 +25,10 @@ REPLAYED ?= raw_data/shaker
 FUZZ_SECONDS ?= 600
 # one more than cores: tests of devices wait for a clock most of their time
 TEST_WORKERS ?= 3
+# every recording is read in a fork, and a fork copies a table of all pages: in large ones it takes a quarter
+LARGE_PAGES = GLIBC_TUNABLES=glibc.malloc.hugetlb=1 PYTHONMALLOC=malloc
 # a file by one worker, in the order of tests/measured_times.csv
-PYTEST = $(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder
+PYTEST = $(LARGE_PAGES) $(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder
 BENCH ?=
 VERSION = $(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' sloshlab/_version.py)
 DOCS_BRANCH ?= gh-pages

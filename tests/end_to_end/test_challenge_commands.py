@@ -33,11 +33,11 @@ def here(tmp_path, monkeypatch) -> Path:
     return tmp_path
 
 
-def answered(folder: Path, monkeypatch, answers: dict) -> None:
-    """Answers of a stand-in for the diagnosis, frozen."""
+def answered(folder: Path, monkeypatch, answers: dict, n_workers: int = 1) -> None:
+    """Answers of a stand-in for the diagnosis, frozen; each worker is an interpreter that has to be started."""
     elsewhere = folder / "kept"
     monkeypatch.setattr("pipelines.diagnosis.challenge.DIAGNOSE", answering(elsewhere, answers))
-    assert run(["trial", "run", "c", "--trust-code"]) == 0
+    assert run(["trial", "run", "c", "--trust-code", "--workers", str(n_workers)]) == 0
 
 
 def test_a_challenge_with_locked_truths_is_counted_by_the_rules_of_every_trial(here, monkeypatch, capsys) -> None:
@@ -61,7 +61,7 @@ def test_a_challenge_with_locked_truths_is_counted_by_the_rules_of_every_trial(h
         "defects": [],
         "own_twins": ["cart"],
     }
-    answered(here, monkeypatch, RIGHT)
+    answered(here, monkeypatch, RIGHT, n_workers=2)
     frozen = json.loads(Path("c/answers.json").read_text())["digest"]
     assert f"publish its digest: {frozen}" in capsys.readouterr().out
     # twins are named to the diagnosis, and only they
