@@ -45,9 +45,10 @@ def case():
         read_recording(FOLDER / f"fill_0.50_{name}.nc") for name in ("sweep_3.00g", "empty_3.00g", "frozen_3.00g")
     ]
     # the first two minutes: 5 to 10 Hz, where W̄ is largest
-    sweep = read[0].isel(time=slice(0, 61_440))
-    sweep = sweep.assign_attrs({k: v for k, v in sweep.attrs.items() if k != "sweep_duration_s"})
-    return Case(sweep, read[1], read[2], 0.61, 0.5)
+    cut = [recording.isel(time=slice(0, 61_440)) for recording in read]
+    for recording in cut:
+        recording.attrs = {name: value for name, value in recording.attrs.items() if name != "sweep_duration_s"}
+    return Case(*cut, 0.61, 0.5)
 
 
 def said(case, folder):
