@@ -27,6 +27,8 @@ FUZZ_SECONDS ?= 600
 TEST_WORKERS ?= 3
 # every recording is read in a fork, and a fork copies a table of all pages: in large ones it takes a quarter
 LARGE_PAGES = GLIBC_TUNABLES=glibc.malloc.hugetlb=1 PYTHONMALLOC=malloc
+# of random inputs a quarter in `make test`, all in `make test-all`
+FEWER = SLOSHLAB_FEWER_EXAMPLES=1
 # a file by one worker, in the order of tests/measured_times.csv
 PYTEST = $(LARGE_PAGES) $(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder
 BENCH ?=
@@ -166,10 +168,10 @@ rivals: setup  ## other ways to answer the cases of `make trial`, marked alike; 
 	  -o $(RESULTS)/rivals
 
 test: setup  ## the tests, at most 10 minutes on 2 cores
-	$(PYTEST) -m "not slow"
+	$(FEWER) $(PYTEST) -m "not slow"
 
 test-times: setup  ## the tests, and what each file of them costs into tests/measured_times.csv
-	$(PYTEST) -m "not slow" -p tests.measured_times
+	$(FEWER) $(PYTEST) -m "not slow" -p tests.measured_times
 
 test-newest:  ## the tests with the newest dependencies, in an environment of their own
 	rm -rf .venv-newest

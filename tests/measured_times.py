@@ -131,12 +131,12 @@ def pytest_testnodedown(node: Any) -> None:
         _TOTAL[name] = [total + part for total, part in zip(_TOTAL[name], times, strict=True)]
 
 
-def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Send what was measured, or write the table."""
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    """Send what was measured, or write the table; of tests that were interrupted there is none."""
     watch = session.config.pluginmanager.get_plugin("stopwatch")
     if hasattr(session.config, "workerinput"):
         session.config.workeroutput["measured_times"] = dict(watch.of_files)  # type: ignore[attr-defined]
-    else:
+    elif exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED):
         TABLE.write_text(table_of(watch.of_files if watch else _TOTAL), encoding="utf-8")
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from number_of_examples import examples
 
 from acquisition.samples.channel import Channel
 from acquisition.samples.delivery import Block, Delivery, End, Trouble, TroubleKind
@@ -53,7 +54,7 @@ def disturbed(draw: st.DrawFn) -> tuple[int, np.ndarray]:
     return start, counters
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=examples(100), deadline=None, derandomize=True)
 @given(disturbed(), st.integers(1, 400), st.booleans())
 def test_whatever_is_accepted_has_its_true_counter(
     stream: tuple[int, np.ndarray], per_call: int, has_status: bool
@@ -80,7 +81,7 @@ def test_whatever_is_accepted_has_its_true_counter(
         assert not turns.any()
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=examples(60), deadline=None, derandomize=True)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 900), st.integers(1, 1000))
 def test_clean_stream_is_accepted_whole(start: int, n_frames: int, per_call: int) -> None:
     counters = np.arange(start, start + n_frames)
@@ -146,7 +147,7 @@ class TestReceiver:
         if not corrupted and not lost:
             assert seen == set(range(600))
 
-    @settings(max_examples=100, deadline=None, derandomize=True)
+    @settings(max_examples=examples(100), deadline=None, derandomize=True)
     @given(st.lists(st.tuples(st.sampled_from([0x100, 0x101, 0x102, 0x80]), st.binary(max_size=64)), max_size=40))
     def test_any_frames_make_troubles_at_most(self, frames: list[tuple[int, bytes]]) -> None:
         receiver = CanReceiver(LAYOUT)
@@ -205,7 +206,7 @@ slcan_frames = st.builds(
 
 
 class TestSlcan:
-    @settings(max_examples=200, deadline=None, derandomize=True)
+    @settings(max_examples=examples(200), deadline=None, derandomize=True)
     @given(
         st.binary(max_size=400) | st.text(alphabet="tTrRdDbB0189aF\r\a\n", max_size=400).map(str.encode), st.data()
     )
@@ -221,7 +222,7 @@ class TestSlcan:
         assert whole.n_bells == first.n_bells + second.n_bells
         assert whole.n_garbage_bytes == first.n_garbage_bytes + second.n_garbage_bytes
 
-    @settings(max_examples=200, deadline=None, derandomize=True)
+    @settings(max_examples=examples(200), deadline=None, derandomize=True)
     @given(st.lists(slcan_frames, max_size=12), st.binary(max_size=30).map(lambda b: b.translate(None, b"\r\n\a")))
     def test_frames_between_garbage_are_all_found(
         self, frames: list[tuple[int, bytes, bool, bool]], garbage: bytes

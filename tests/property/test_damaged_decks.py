@@ -8,6 +8,7 @@ from tempfile import TemporaryDirectory
 from hand_made_decks import beam_cards, fields
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from number_of_examples import examples
 
 from sloshlab.aircraft.deck_reader import read_deck
 from sloshlab.aircraft.structure import structure_of_deck
@@ -36,7 +37,7 @@ SLIPS = st.tuples(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(st.lists(SLIPS, min_size=1, max_size=3), st.sets(st.integers(0, len(LINES) - 1), max_size=1))
 def test_a_slip_is_refused_in_one_line_or_harmless(slips: list[tuple[int, int, str]], lost: set[int]) -> None:
     lines = list(LINES)

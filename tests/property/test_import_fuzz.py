@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from number_of_examples import examples
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "unit" / "acquisition" / "files"))
 from import_scenarios import RUN, SCENARIOS, Scenario
@@ -25,7 +26,10 @@ from sloshlab.errors import ChannelMapError, InputError
 _N_DAMAGED = 8
 """Of each format; `make fuzz` goes on for as long as asked."""
 FUZZ = settings(
-    max_examples=30, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=examples(30),
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 SCALARS = (
     st.none()

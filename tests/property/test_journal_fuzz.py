@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from number_of_examples import examples
 
 from acquisition.recorder.journal import Journal, JournalWriter, read_journal
 from acquisition.samples.channel import Channel
@@ -26,7 +27,10 @@ INFO = SourceInfo(
     ((0, 1), (2,)),
 )
 QUIET = settings(
-    max_examples=150, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=examples(150),
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 
 

@@ -14,6 +14,7 @@ import pytest
 import xarray as xr
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from number_of_examples import examples
 
 from acquisition.files.description import describe_source
 from sloshlab.errors import RecordingError, SloshlabError
@@ -23,7 +24,10 @@ from sloshlab.units import SI_UNITS
 _N_DAMAGED = 400
 """`make fuzz` goes on for as long as asked."""
 FUZZ = settings(
-    max_examples=80, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=examples(80),
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 READER = Path(__file__).with_name("recording_reader.py")
 N_SAMPLES = 240

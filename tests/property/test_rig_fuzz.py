@@ -6,11 +6,12 @@ import math
 
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from number_of_examples import examples
 
 from sloshlab.errors import RigError
 from sloshlab.rig import Rig
 
-FUZZ = settings(max_examples=200, deadline=None, derandomize=True)
+FUZZ = settings(max_examples=examples(200), deadline=None, derandomize=True)
 GOOD = {
     "tank": {"height_m": 0.0272, "length_m": 0.1172, "width_m": 0.078, "dry_mass_kg": 0.61},
     "liquid": {"density_kg_per_m3": 1000.0, "fill_level": 0.5, "name": "water"},

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from number_of_examples import examples
 
 from acquisition.samples.delivery import Block, Trouble, TroubleKind
 from acquisition.wire import cobs
@@ -31,7 +32,7 @@ from acquisition.wire.serial_frames import (
     parse,
 )
 
-FUZZ = settings(max_examples=200, deadline=None, derandomize=True)
+FUZZ = settings(max_examples=examples(200), deadline=None, derandomize=True)
 LONGEST_REST = 65_535 + 259 + 1
 U16, U32, U64 = (st.integers(0, 2**n - 1) for n in (16, 32, 64))
 
