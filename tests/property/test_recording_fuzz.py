@@ -21,7 +21,7 @@ from sloshlab.errors import RecordingError, SloshlabError
 from sloshlab.recording import LOST, channels, read_recording, write_recording
 from sloshlab.units import SI_UNITS
 
-_N_DAMAGED = 400
+_N_DAMAGED = examples(400)
 """`make fuzz` goes on for as long as asked."""
 FUZZ = settings(
     max_examples=examples(80),
