@@ -25,7 +25,7 @@ REPLAYED ?= raw_data/shaker
 FUZZ_SECONDS ?= 600
 # one more than cores: tests of devices wait for a clock most of their time
 TEST_WORKERS ?= 3
-# every recording is read in a fork, and a fork copies a table of all pages: in large ones it takes a quarter
+# every recording is read in a fork, and a fork copies a table of all pages: in large ones it takes a third
 LARGE_PAGES = GLIBC_TUNABLES=glibc.malloc.hugetlb=1 PYTHONMALLOC=malloc
 # of random inputs a quarter in `make test`, all in `make test-all`
 FEWER = SLOSHLAB_FEWER_EXAMPLES=1
