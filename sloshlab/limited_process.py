@@ -27,7 +27,7 @@ import tempfile
 import time
 import traceback
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NoReturn, TypeVar
@@ -35,9 +35,10 @@ from typing import Any, Final, NoReturn, TypeVar
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from sloshlab import errors, interrupt
+from sloshlab import errors, interrupt, out_of_core
 from sloshlab.errors import InputError, MissingExtraError, SourceError
 from sloshlab.netcdf_lock import NETCDF_LOCK
+from sloshlab.out_of_core import unnamed_file
 from sloshlab.returned_values import Packed, Store, Unpacked
 
 CAN_FORK: Final = sys.platform == "linux"
@@ -116,14 +117,14 @@ class UntrustedFile:
         """
         if _Child.store is not None:  # what a limited process reads in turn is within its limits
             return reader(*arguments)
-        answer, store = (_by_fork if fork else _by_interpreter)(self, reader, arguments)
+        answer, files = (_by_fork if fork else _by_interpreter)(self, reader, arguments)
         if "error" in answer:
             raise _error_of_child(answer["error"])
         if "memory" in answer:
             raise self.refused(f"more than the {self.limits.memory_bytes / 2**30:.1f} GiB that reading may take")
         if "unexpected" in answer:
             raise RuntimeError(f"{self.what}: {answer['unexpected']}")
-        value: T = Unpacked(store).value(answer["result"])
+        value: T = Unpacked(*files).value(answer["result"])
         return value
 
     def of_the_dead(self, status: int) -> InputError:
@@ -144,7 +145,7 @@ class UntrustedFile:
 
 def empty(n: int, dtype: DTypeLike) -> NDArray[Any]:
     """Uninitialised array; within a child it lies where the other process finds it without a copy."""
-    return np.empty(n, dtype) if _Child.store is None else _Child.store.empty(n, np.dtype(dtype))
+    return out_of_core.empty(n, dtype) if _Child.store is None else _Child.store.empty(n, np.dtype(dtype))
 
 
 class _Child:
@@ -155,10 +156,13 @@ class _Child:
 
 def _by_fork(
     file: UntrustedFile, reader: Callable[..., Any], arguments: tuple[Any, ...]
-) -> tuple[dict[str, Any], memoryview]:
+) -> tuple[dict[str, Any], list[memoryview]]:
     with contextlib.ExitStack() as closing:
-        numbers = os.memfd_create("numbers")
-        closing.callback(os.close, numbers)
+        numbers = [os.memfd_create("numbers")]
+        closing.callback(os.close, numbers[0])
+        # without a folder for temporary files everything is in memory
+        with contextlib.suppress(OSError):
+            numbers.append(closing.enter_context(unnamed_file()))
         # held, so that no other thread is within the netCDF library at this moment (in the fork it would stay
         # there), and that no other child keeps this one's end of the pipe
         with NETCDF_LOCK, warnings.catch_warnings():
@@ -183,7 +187,7 @@ def _by_fork(
                 status = _ended(child)
         if status or not answer:
             raise file.of_the_dead(status)
-        return json.loads(answer), _mapped(numbers)
+        return json.loads(answer), [_mapped(descriptor) for descriptor in numbers]
 
 
 def _received(descriptor: int, file: UntrustedFile) -> bytes:
@@ -211,7 +215,7 @@ def _ended(child: int) -> int:
         return 0
 
 
-def _in_fork(limits: ReadingLimits, numbers: int, theirs: int, read: Callable[[], Any]) -> NoReturn:
+def _in_fork(limits: ReadingLimits, numbers: Sequence[int], theirs: int, read: Callable[[], Any]) -> NoReturn:
     code = 1
     try:
         # Ctrl-C is for the other process, which ends this one; of what a C library prints nobody knows the file
@@ -234,7 +238,7 @@ def _in_fork(limits: ReadingLimits, numbers: int, theirs: int, read: Callable[[]
 
 def _by_interpreter(
     file: UntrustedFile, reader: Callable[..., Any], arguments: tuple[Any, ...]
-) -> tuple[dict[str, Any], memoryview]:
+) -> tuple[dict[str, Any], list[memoryview]]:
     # in a folder: on Windows a file that is open here cannot be opened there
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "numbers")
@@ -261,7 +265,7 @@ def _by_interpreter(
                 child.kill()
         if child.returncode or not answer:
             raise file.of_the_dead(child.returncode)
-        return json.loads(answer), memoryview(bytearray(path.read_bytes()))
+        return json.loads(answer), [memoryview(bytearray(path.read_bytes()))]
 
 
 def serve() -> None:
@@ -272,7 +276,7 @@ def serve() -> None:
     module, name = request["reader"]
     numbers = os.open(request["numbers"], os.O_RDWR | getattr(os, "O_BINARY", 0))
     limits = ReadingLimits(*request["limits"])
-    out.write(_answer(limits, numbers, lambda: _called(module, name, request["arguments"])))
+    out.write(_answer(limits, [numbers], lambda: _called(module, name, request["arguments"])))
     out.close()
 
 
@@ -280,8 +284,8 @@ def _called(module: str, name: str, arguments: list[Any]) -> Any:
     return getattr(importlib.import_module(module), name)(*arguments)
 
 
-def _answer(limits: ReadingLimits, numbers: int, read: Callable[[], Any]) -> bytes:
-    _Child.store = Store(numbers)
+def _answer(limits: ReadingLimits, numbers: Sequence[int], read: Callable[[], Any]) -> bytes:
+    _Child.store = Store(*numbers)
     answer: dict[str, Any]
     try:
         with _limited(limits):

@@ -6,6 +6,7 @@ can only be wrong numbers.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import mmap
 import os
@@ -15,43 +16,64 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sloshlab.out_of_core import LARGEST_IN_MEMORY_BYTES, reserve
+
 # a cache line: no array begins within the one before, and every type is aligned
 _ALIGNMENT = 64
 
 
 class Store:
-    """Arrays in a file that both processes have."""
+    """Arrays in files that both processes have.
 
-    def __init__(self, descriptor: int) -> None:
-        self._descriptor = descriptor
-        self._n_bytes = 0
-        self._parts: list[tuple[int, int, int]] = []  # address, bytes, offset
+    Parameters
+    ----------
+    descriptor : int
+        Of a file in memory.
+    on_disk : int, optional
+        Of one on the disk, for arrays that need not fit into memory.
+    """
+
+    def __init__(self, descriptor: int, on_disk: int | None = None) -> None:
+        self._descriptors = [descriptor] if on_disk is None else [descriptor, on_disk]
+        self._n_bytes = [0] * len(self._descriptors)
+        self._parts: list[tuple[int, int, int, int]] = []  # address, bytes, file, offset
 
     def empty(self, n: int, dtype: np.dtype[Any]) -> NDArray[Any]:
         """Array of which no copy is needed."""
         n_bytes = n * dtype.itemsize
         if not n_bytes:
             return np.empty(n, dtype)
-        offset = -(-self._n_bytes // mmap.ALLOCATIONGRANULARITY) * mmap.ALLOCATIONGRANULARITY
-        self._n_bytes = offset + n_bytes
-        os.truncate(self._descriptor, self._n_bytes)
-        array = np.frombuffer(mmap.mmap(self._descriptor, n_bytes, offset=offset), dtype)
-        self._parts.append((array.ctypes.data, n_bytes, offset))
+        if n_bytes > LARGEST_IN_MEMORY_BYTES and len(self._descriptors) > 1:
+            # a disk that is full: in memory then
+            with contextlib.suppress(OSError):
+                return self._mapped(1, n_bytes, dtype)
+        return self._mapped(0, n_bytes, dtype)
+
+    def _mapped(self, file: int, n_bytes: int, dtype: np.dtype[Any]) -> NDArray[Any]:
+        descriptor = self._descriptors[file]
+        offset = -(-self._n_bytes[file] // mmap.ALLOCATIONGRANULARITY) * mmap.ALLOCATIONGRANULARITY
+        if file:
+            reserve(descriptor, offset, n_bytes)
+        else:
+            os.truncate(descriptor, offset + n_bytes)
+        self._n_bytes[file] = offset + n_bytes
+        array = np.frombuffer(mmap.mmap(descriptor, n_bytes, offset=offset), dtype)
+        self._parts.append((array.ctypes.data, n_bytes, file, offset))
         return array
 
-    def offset(self, array: NDArray[Any]) -> int:
-        """Where the array is, after it has been written if it was not made here."""
+    def place(self, array: NDArray[Any]) -> tuple[int, int]:
+        """Offset and number of the file where the array is, written there if it was not made here."""
         address = array.ctypes.data
-        for begins, n_bytes, offset in self._parts:
+        for begins, n_bytes, file, offset in self._parts:
             if begins <= address and address + array.nbytes <= begins + n_bytes:
-                return offset + address - begins
-        start = -(-self._n_bytes // _ALIGNMENT) * _ALIGNMENT
+                return offset + address - begins, file
+        start = -(-self._n_bytes[0] // _ALIGNMENT) * _ALIGNMENT
         rest = memoryview(array.reshape(-1).view(np.uint8).data)
-        os.lseek(self._descriptor, start, os.SEEK_SET)
+        os.lseek(self._descriptors[0], start, os.SEEK_SET)
         while rest:
-            rest = rest[os.write(self._descriptor, rest) :]
-        self._n_bytes = start + array.nbytes
-        return start
+            rest = rest[os.write(self._descriptors[0], rest) :]
+        self._n_bytes[0] = start + array.nbytes
+        return start, 0
 
 
 class Packed:
@@ -84,7 +106,8 @@ class Packed:
             packed = ["texts", list(array.shape), [str(item) for item in array.flat]]
         else:
             contiguous = np.ascontiguousarray(array).reshape(array.shape)
-            packed = [array.dtype.str, list(array.shape), self._store.offset(contiguous) if array.size else 0]
+            place = self._store.place(contiguous) if array.size else (0, 0)
+            packed = [array.dtype.str, list(array.shape), *place]
         # kept, so that no other array gets its place and number
         self._seen[id(value)] = value, packed
         return packed
@@ -93,9 +116,9 @@ class Packed:
 class Unpacked:
     """The reverse of `Packed`."""
 
-    def __init__(self, store: memoryview) -> None:
-        self._store = store
-        self._arrays: dict[tuple[int, str, tuple[int, ...]], NDArray[Any]] = {}
+    def __init__(self, *files: memoryview) -> None:
+        self._files = files
+        self._arrays: dict[tuple[int, int, str, tuple[int, ...]], NDArray[Any]] = {}
 
     def value(self, packed: Any) -> Any:
         """The value."""
@@ -110,15 +133,15 @@ class Unpacked:
             return self._array(*content)[()]
         return tuple(map(self.value, content)) if kind == "tuple" else list(map(self.value, content))
 
-    def _array(self, dtype: str, shape: list[int], where: Any) -> NDArray[Any]:
+    def _array(self, dtype: str, shape: list[int], where: Any, file: int = 0) -> NDArray[Any]:
         if dtype == "texts":
             texts = np.empty(len(where), dtype=object)
             texts[:] = where
             return texts.reshape(shape)
-        key = where, dtype, tuple(shape)
+        key = where, file, dtype, tuple(shape)
         if key not in self._arrays:
             n = math.prod(shape)
-            whole = np.frombuffer(self._store, dtype, n, where) if n else np.empty(0, dtype)
+            whole = np.frombuffer(self._files[file], dtype, n, where) if n else np.empty(0, dtype)
             self._arrays[key] = whole.reshape(shape)
         # without elements all arrays of a kind have the same place; they are nobody's clock
         return self._arrays[key]

@@ -39,6 +39,7 @@ from sloshlab.consistency.examination import Reference
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.experiments import experiment_names
 from sloshlab.maps.energy_maps import energy_maps
+from sloshlab.out_of_core import blocks
 from sloshlab.quantities import described
 from sloshlab.recording import RunAttributes, channels
 from sloshlab.rig import Rig
@@ -243,7 +244,8 @@ def sweep_signals(recording: xr.Dataset, rig: Rig, dry: DryMass | None, quality:
     force = total_force(recording).values
     # by g before anything else, so that force and acceleration are on one scale; in place and in its own type,
     # because long recordings cost memory traffic
-    force /= gain
+    for part in blocks(force.size if gain != 1.0 else 0, force):
+        force[part] /= gain
     return SweepSignals(
         force_n=force,
         motion=mean_acceleration(recording).values,

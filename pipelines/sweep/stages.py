@@ -20,6 +20,7 @@ from sloshlab.consistency.examination import Reference, examined
 from sloshlab.consistency.finding import ConsistencyExamination
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.experiments import EXPERIMENTS
+from sloshlab.out_of_core import blocks, empty
 from sloshlab.recording import CLIPPED, CRC_REPAIRED, LOST, STUCK, RunAttributes, run_attributes
 from sloshlab.rig import Rig
 from sloshlab.sweep.cycles import evaluate_cycles
@@ -94,11 +95,16 @@ def not_measured(recording: xr.Dataset, names: list[str], quality: RunQuality) -
     # a clipped or repaired sample need not be NaN: its value would enter the work
     mask: BoolArray | None = None
     if "quality" in recording:
-        mask = (recording["quality"].values & (LOST | CLIPPED | CRC_REPAIRED | STUCK)) != 0
+        flags = recording["quality"].values
+        mask = empty(flags.size, np.bool_)
+        for part in blocks(flags.size, flags, mask):
+            np.not_equal(flags[part] & (LOST | CLIPPED | CRC_REPAIRED | STUCK), 0, out=mask[part])
     for name in names:
         if name in suffers:
             clipped = clipped_samples(recording[name])
-            mask = clipped if mask is None else mask | clipped
+            mask = clipped if mask is None else mask
+            for part in blocks(mask.size, mask, clipped):
+                mask[part] |= clipped[part]
     return mask
 
 

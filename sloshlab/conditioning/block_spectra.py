@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,13 +19,17 @@ from numba import njit
 
 from sloshlab.conditioning.gaps import require_channels, sampling_step_s
 from sloshlab.errors import AnalysisError
+from sloshlab.out_of_core import blocks
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
+BoolArray = npt.NDArray[np.bool_]
 
 # more than twice the highest frequency that is looked for
 _LOWEST_RATE_HZ = 400.0
 _BLOCK_S = 1.0
+_BLOCKS_AT_ONCE = 64
+"""Whose spectra are in memory together."""
 _LINES_BESIDE = 2
 """To each side of the largest line: a Hann window spreads a sine over so many."""
 _FEWEST_SAMPLES_PER_BLOCK = 32
@@ -118,32 +123,60 @@ def block_spectra(
             remedy="record longer",
         )
     signals = [reference, *(recording[name].values for name in names)]
-    spectra = np.stack([_spectra(signal, factor, per_block) for signal in signals])
-    # a block with a lost sample in any channel is left out for all, so that ratios compare the same motion
-    whole = np.isfinite(spectra).all(axis=(0, 2))
-    spectra = spectra[:, whole]
-    if spectra.shape[1] == 0:
+    line_hz = 1.0 / (per_block * factor * step_s)
+    n_of_block = per_block * factor
+    n = reference.size // n_of_block * n_of_block
+    parts = []
+    for part in blocks(n, *signals, of=_BLOCKS_AT_ONCE * n_of_block):
+        spectra = np.stack([_spectra(signal[part], factor, per_block) for signal in signals])
+        parts.append(_part(spectra, line_hz, frequency_range_hz))
+    whole = np.concatenate([part.whole for part in parts]) if parts else np.zeros(0, dtype=np.bool_)
+    if not whole.any():
         raise AnalysisError(
             f"channels {', '.join(names)}",
             got="lost samples in every block",
             allowed=f"at least {per_block * factor * step_s:.3g} s without a lost sample",
             remedy="record again",
         )
-    line_hz = 1.0 / (per_block * factor * step_s)
+    return BlockSpectra(
+        names=tuple(names),
+        middle_s=np.asarray((np.flatnonzero(whole) + 0.5) / line_hz, dtype=np.float64),
+        omega_rad_per_s=np.concatenate([part.omega_rad_per_s for part in parts]),
+        power=np.concatenate([part.power for part in parts]),
+        cross=np.concatenate([part.cross for part in parts], axis=1),
+        own_power=np.concatenate([part.own_power for part in parts], axis=1),
+    )
+
+
+class _Part(NamedTuple):
+    """Some blocks in a row: which are whole, and the results of these."""
+
+    whole: BoolArray
+    omega_rad_per_s: FloatArray
+    power: FloatArray
+    cross: ComplexArray
+    own_power: FloatArray
+
+
+def _part(spectra: ComplexArray, line_hz: float, frequency_range_hz: tuple[float, float]) -> _Part:
+    """From spectra of the reference and of the channels, shape (1 + n_names, n_blocks, n_lines)."""
+    # a block with a lost sample in any channel is left out for all, so that ratios compare the same motion
+    whole = np.isfinite(spectra).all(axis=(0, 2))
+    spectra = spectra[:, whole]
     lines = _lines_around_maximum(spectra[0], line_hz, frequency_range_hz)
     # the same lines in all channels, those of the reference
     x, *others = (np.take_along_axis(spectrum, lines, axis=1) for spectrum in spectra)
     x_power = np.abs(x) ** 2
     power = x_power.sum(axis=1)
     weighted = (x_power * lines).sum(axis=1)
-    omega = 2 * np.pi * line_hz * np.divide(weighted, power, out=np.zeros_like(power), where=power > 0)
-    return BlockSpectra(
-        names=tuple(names),
-        middle_s=np.asarray((np.flatnonzero(whole) + 0.5) / line_hz, dtype=np.float64),
-        omega_rad_per_s=omega,
+    mean_line = np.divide(weighted, power, out=np.zeros_like(power), where=power > 0)
+    shape = (len(others), power.size)
+    return _Part(
+        whole=whole,
+        omega_rad_per_s=2 * np.pi * line_hz * mean_line,
         power=power,
-        cross=np.array([(y * x.conj()).sum(axis=1) for y in others], dtype=np.complex128),
-        own_power=np.array([(np.abs(y) ** 2).sum(axis=1) for y in others], dtype=np.float64),
+        cross=np.array([(y * x.conj()).sum(axis=1) for y in others], dtype=np.complex128).reshape(shape),
+        own_power=np.array([(np.abs(y) ** 2).sum(axis=1) for y in others], dtype=np.float64).reshape(shape),
     )
 
 

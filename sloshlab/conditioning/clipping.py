@@ -10,6 +10,9 @@ import xarray as xr
 from numba import njit
 
 from sloshlab.conditioning.gaps import BoolArray
+from sloshlab.out_of_core import blocks, empty
+
+IntArray = npt.NDArray[np.int64]
 
 _RANGE_SHARE = 1e-6
 _SHORTEST_FLAT_TOP = 3
@@ -83,9 +86,11 @@ def clipped_samples(channel: xr.DataArray) -> BoolArray:
     """
     low, high = clipping_limits(channel)
     values = channel.values
-    # comparisons with NaN are false: lost samples are not clipped
-    clipped = values >= high
-    np.logical_or(clipped, values <= low, out=clipped)
+    clipped: BoolArray = empty(values.size, np.bool_)
+    for part in blocks(values.size, values, clipped):
+        # comparisons with NaN are false: lost samples are not clipped
+        np.greater_equal(values[part], high, out=clipped[part])
+        np.logical_or(clipped[part], values[part] <= low, out=clipped[part])
     return clipped
 
 
@@ -113,7 +118,11 @@ def clipping(channel: xr.DataArray) -> Clipping:
     True
     """
     low, high = clipping_limits(channel)
-    counts, tops = _scan(channel.values, low, high)
+    values = channel.values
+    counts, tops, running = np.zeros(4, np.int64), np.zeros((2, 3), np.int64), np.zeros(3, np.int64)
+    extremes = np.array([-np.inf, -np.inf, np.inf, np.inf])
+    for part in blocks(values.size, values):
+        _scan(values[part], part.start, (low, high), counts, tops, running, extremes)
     n_clipped, n_runs, longest_run, first = (int(value) for value in counts)
     n_suspected = sum(
         int(at_extreme)
@@ -133,20 +142,28 @@ def clipping(channel: xr.DataArray) -> Clipping:
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _scan(
-    values: npt.NDArray[np.float64], low: float, high: float
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Counts at the stated limits; per end (max, min): samples at extreme, at next value, longest run."""
-    counts = np.zeros(4, np.int64)
-    tops = np.zeros((2, 3), np.int64)
-    clipped_run, run_high, run_low = 0, 0, 0
-    # largest and second largest value so far, with how often each was met: no histogram, no second pass
-    top, below_top = -np.inf, -np.inf
-    bottom, above_bottom = np.inf, np.inf
+    values: npt.NDArray[np.float64],
+    first: int,
+    limits: tuple[float, float],
+    counts: IntArray,
+    tops: IntArray,
+    running: IntArray,
+    extremes: npt.NDArray[np.float64],
+) -> None:
+    """Go on with a block whose first sample is the `first` of the channel, all but it and `limits` in place.
+
+    `counts` is of samples at the stated limits; `tops` per end (max, min) of samples at the extreme, at the next
+    value, and the longest run; `running` are the lengths of runs that reach the end; `extremes` the largest,
+    second largest, smallest and second smallest value so far: no histogram, no second pass.
+    """
+    low, high = limits
+    clipped_run, run_high, run_low = running[0], running[1], running[2]
+    top, below_top, bottom, above_bottom = extremes[0], extremes[1], extremes[2], extremes[3]
     for i in range(values.size):
         value = float(values[i])
         if value >= high or value <= low:
             if counts[0] == 0:
-                counts[3] = i
+                counts[3] = first + i
             if clipped_run == 0:
                 counts[1] += 1
             counts[0] += 1
@@ -183,4 +200,6 @@ def _scan(
                 above_bottom, tops[1, 1] = value, 1
             elif value == above_bottom:
                 tops[1, 1] += 1
-    return counts, tops
+    # one by one: to give an array to a slice, numba compiles an error message for seconds
+    running[0], running[1], running[2] = clipped_run, run_high, run_low
+    extremes[0], extremes[1], extremes[2], extremes[3] = top, below_top, bottom, above_bottom

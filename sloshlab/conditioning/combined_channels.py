@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,7 @@ from sloshlab.channel_names import (
 )
 from sloshlab.conditioning.gaps import require_channels
 from sloshlab.errors import AnalysisError
+from sloshlab.out_of_core import blocks, empty
 from sloshlab.recording import channels
 from sloshlab.units import SI_UNITS
 
@@ -168,6 +169,32 @@ def mean_acceleration(
     return _combined(recording, chosen, factors, "acceleration_mean", "acceleration")
 
 
+class TankSignals(NamedTuple):
+    """Force on a tank and its acceleration, combined once for all who ask.
+
+    Attributes
+    ----------
+    force : xarray.DataArray
+        `total_force` of the recording.
+    acceleration : xarray.DataArray
+        `mean_acceleration` of it.
+    """
+
+    force: xr.DataArray
+    acceleration: xr.DataArray
+
+
+def tank_signals(recording: xr.Dataset) -> TankSignals:
+    """Force and acceleration of the tank of a recording.
+
+    Raises
+    ------
+    AnalysisError
+        If a channel is missing.
+    """
+    return TankSignals(total_force(recording), mean_acceleration(recording))
+
+
 def dynamic_force_noise_power(
     recording: xr.Dataset, forces: Sequence[str], accelerations: Sequence[str], mass_kg: float
 ) -> float:
@@ -206,16 +233,20 @@ def _require_quantity(recording: xr.Dataset, names: Sequence[str], quantity: str
 def _combined(
     recording: xr.Dataset, names: Sequence[str], factors: Sequence[float], name: str, quantity: str
 ) -> xr.DataArray:
-    """Σ factor × channel in the widest type of the channels, in place after the first product."""
+    """Σ factor × channel in the widest type of the channels, block by block."""
     # equal factors are applied once to the sum: no temporary array per channel
     equal = len(set(factors)) == 1
     # single precision stays single, which halves the memory
     widest = np.result_type(*(recording[channel].dtype for channel in names), np.float32)
-    total = np.multiply(recording[names[0]].values, 1.0 if equal else factors[0], dtype=widest)
-    for channel, factor in zip(names[1:], factors[1:], strict=True):
-        values = recording[channel].values
-        np.add(total, values if equal else factor * values, out=total, casting="same_kind")
-    if equal and factors[0] != 1.0:
-        total *= widest.type(factors[0])
+    values = [recording[channel].values for channel in names]
+    total = empty(values[0].size, widest)
+    for part in blocks(total.size, total, *values):
+        of_part = total[part]
+        np.multiply(values[0][part], 1.0 if equal else factors[0], out=of_part, dtype=widest)
+        for of_channel, factor in zip(values[1:], factors[1:], strict=True):
+            more = of_channel[part] if equal else factor * of_channel[part]
+            np.add(of_part, more, out=of_part, casting="same_kind")
+        if equal and factors[0] != 1.0:
+            of_part *= widest.type(factors[0])
     attributes = {"units": SI_UNITS[quantity], "quantity": quantity, "combined_from": ", ".join(names)}
     return derived_channel(recording[names[0]], total, name, attributes)

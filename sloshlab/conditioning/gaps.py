@@ -6,7 +6,7 @@ NaN, it is not known which value is wrong, and all channels are taken as lost th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ import xarray as xr
 from numba import njit
 
 from sloshlab.errors import AnalysisError
+from sloshlab.out_of_core import blocks, empty, release
 from sloshlab.recording import LOST, channels
 
 BoolArray = npt.NDArray[np.bool_]
@@ -73,25 +74,41 @@ def sample_is_usable(recording: xr.Dataset, names: Sequence[str] | None = None) 
     AnalysisError
         If a named channel is not in the recording.
     """
+    usable: BoolArray = empty(recording.sizes["time"], np.bool_)
+    for part, of_part in _usable_blocks(recording, names):
+        usable[part] = of_part
+        release(usable[part])
+    return usable
+
+
+def _usable_blocks(recording: xr.Dataset, names: Sequence[str] | None) -> Iterator[tuple[slice, BoolArray]]:
+    """Blocks of samples, and which of them may be used."""
     everything = channels(recording)
     wanted = everything if names is None else list(names)
     require_channels(recording, wanted)
-    usable = np.ones(recording.sizes["time"], dtype=np.bool_)
-    for name in wanted:
-        mark_nan(recording[name].values, usable)
-    # all channels are looked at here, also when few were asked for: a flag belongs to the sample, not to a
-    # channel
-    usable[_flagged_without_nan(recording, everything)] = False
-    return usable
+    values = {name: recording[name].values for name in {*everything, *wanted}}
+    flags = recording["quality"].values if "quality" in recording else np.zeros(0, np.uint8)
+    for part in blocks(recording.sizes["time"], *values.values(), *([flags] if flags.size else [])):
+        usable = np.ones(part.stop - part.start, dtype=np.bool_)
+        for name in wanted:
+            mark_nan(values[name][part], usable)
+        # all channels are looked at here, also when few were asked for: a flag belongs to the sample, not to a
+        # channel
+        usable[_flagged_without_nan(flags[part], [values[name][part] for name in everything])] = False
+        yield part, usable
 
 
 def gaps(recording: xr.Dataset, names: Sequence[str] | None = None) -> tuple[Gap, ...]:
     """Runs of samples that are lost in at least one of the named channels, in order of time."""
-    usable = sample_is_usable(recording, names)
-    time = recording["time"].values
-    return tuple(
-        Gap(float(time[start]), float(time[stop - 1]), int(stop - start)) for start, stop in runs(usable, False)
-    )
+    time, found = recording["time"].values, list[list[int]]()
+    for part, usable in _usable_blocks(recording, names):
+        for start, stop in (part.start + run_bounds(usable, False)).tolist():
+            # what reaches the end of a block goes on in the next
+            if found and found[-1][1] == start:
+                found[-1][1] = stop
+            else:
+                found.append([start, stop])
+    return tuple(Gap(float(time[start]), float(time[stop - 1]), stop - start) for start, stop in found)
 
 
 def runs(mask: BoolArray, value: bool) -> list[tuple[int, int]]:
@@ -141,16 +158,14 @@ def require_channels(recording: xr.Dataset, names: Sequence[str]) -> None:
         )
 
 
-def _flagged_without_nan(recording: xr.Dataset, names: Sequence[str]) -> Any:
+def _flagged_without_nan(flags: npt.NDArray[np.uint8], values: Sequence[npt.NDArray[np.floating]]) -> Any:
     """Indices flagged as lost where no channel is NaN."""
-    if "quality" not in recording:
-        return np.empty(0, dtype=np.intp)
-    flagged = np.flatnonzero(recording["quality"].values & LOST)
+    flagged = np.flatnonzero(flags & LOST)
     # what some channel explains by its NaN costs that channel only
-    for name in names:
+    for of_channel in values:
         if flagged.size == 0:
             break
-        flagged = flagged[~np.isnan(recording[name].values[flagged])]
+        flagged = flagged[~np.isnan(of_channel[flagged])]
     return flagged
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,7 @@ from sloshlab.conditioning.clipping import Clipping, clipping
 from sloshlab.conditioning.gaps import Gap, gaps, sampling_step_s
 from sloshlab.conditioning.redundancy import SensorAgreement, agreement, redundant_accelerometers
 from sloshlab.errors import AnalysisError
+from sloshlab.out_of_core import blocks
 from sloshlab.recording import CLIPPED, CRC_REPAIRED, OUT_OF_ORDER, STUCK, channels
 
 LARGEST_LOST_FRACTION = 0.5
@@ -176,11 +177,13 @@ def _flag_counts(recording: xr.Dataset) -> dict[int, int]:
     bits = (CLIPPED, CRC_REPAIRED, OUT_OF_ORDER, STUCK)
     if "quality" not in recording:
         return dict.fromkeys(bits, 0)
-    flags = recording["quality"].values
-    # most recordings have no flags: one pass instead of four
-    if not flags.any():
-        return dict.fromkeys(bits, 0)
-    return {bit: int(np.count_nonzero(flags & bit)) for bit in bits}
+    flags, counts = recording["quality"].values, dict.fromkeys(bits, 0)
+    for part in blocks(flags.size, flags):
+        # most blocks have no flags: one pass instead of four
+        if flags[part].any():
+            for bit in bits:
+                counts[bit] += int(np.count_nonzero(flags[part] & bit))
+    return counts
 
 
 def _accelerometer_agreement(
@@ -264,7 +267,10 @@ def _gain_remarks(agreed: SensorAgreement | None) -> list[str]:
 
 def sample_statistics(values: npt.NDArray[Any]) -> tuple[int, float, float, float, float]:
     """How many values are no NaN; their minimum, maximum, mean and standard deviation, NaN if there are none."""
-    n, minimum, maximum, origin, total, squares = _sums(values)
+    sums = _Sums(0, math.inf, -math.inf, 0.0, 0.0, 0.0)
+    for part in blocks(values.size, values):
+        sums = _added(values[part], sums)
+    n, minimum, maximum, origin, total, squares = sums
     if n == 0:
         return 0, math.nan, math.nan, math.nan, math.nan
     mean = total / n
@@ -273,12 +279,21 @@ def sample_statistics(values: npt.NDArray[Any]) -> tuple[int, float, float, floa
     return n, minimum, maximum, origin + mean, math.sqrt(max(variance, 0.0)) if variance < math.inf else math.inf
 
 
+class _Sums(NamedTuple):
+    """Running sums of the values so far."""
+
+    n: int
+    minimum: float
+    maximum: float
+    origin: float  # the first value
+    total: float  # Σ(x − origin)
+    squares: float  # Σ(x − origin)²
+
+
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _sums(values: npt.NDArray[np.float64]) -> tuple[int, float, float, float, float, float]:
-    """n, min, max, origin, Σ(x − origin), Σ(x − origin)²; the origin is the first value."""
-    n = 0
-    minimum, maximum, origin = np.inf, -np.inf, 0.0
-    total, squares = 0.0, 0.0
+def _added(values: npt.NDArray[np.float64], before: _Sums) -> _Sums:
+    """The sums with more values."""
+    n, minimum, maximum, origin, total, squares = before
     for i in range(values.size):
         value = float(values[i])
         # NaN, a lost sample
@@ -292,4 +307,4 @@ def _sums(values: npt.NDArray[np.float64]) -> tuple[int, float, float, float, fl
         value -= origin
         total += value
         squares += value * value
-    return n, minimum, maximum, origin, total, squares
+    return _Sums(n, minimum, maximum, origin, total, squares)

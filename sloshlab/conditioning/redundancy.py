@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ from sloshlab.channel_names import ACCELERATION_CONTROL, ACCELERATION_ROOF
 from sloshlab.conditioning.block_spectra import block_spectra, delay_s
 from sloshlab.conditioning.gaps import require_channels
 from sloshlab.errors import AnalysisError
+from sloshlab.out_of_core import blocks
 from sloshlab.recording import channels
 
 PHASE_ERROR_AT_HZ = 20.0
@@ -198,7 +199,10 @@ def _wrong_signs(reference: str, pairs: Sequence[PairAgreement]) -> tuple[str, .
 
 
 def _rms_disagreement(x: npt.NDArray[np.float64], y: npt.NDArray[np.float64]) -> float:
-    n, sum_x, sum_xx, sum_d, sum_dd = _sums(x, y)
+    sums = _Sums(0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for part in blocks(x.size, x, y):
+        sums = _added(x[part], y[part], sums)
+    n, _, _, sum_x, sum_xx, sum_d, sum_dd = sums
     if n == 0:
         return float("nan")
     # about the mean: static offsets of accelerometers are no disagreement about the motion
@@ -207,12 +211,22 @@ def _rms_disagreement(x: npt.NDArray[np.float64], y: npt.NDArray[np.float64]) ->
     return math.sqrt(variance_d / variance_x) if variance_x > 0 else float("nan")
 
 
+class _Sums(NamedTuple):
+    """Running sums where x and d = y − x are there, both taken from their first values to save digits."""
+
+    n: int
+    x_origin: float
+    d_origin: float
+    sum_x: float
+    sum_xx: float
+    sum_d: float
+    sum_dd: float
+
+
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _sums(x: npt.NDArray[np.float64], y: npt.NDArray[np.float64]) -> tuple[int, float, float, float, float]:
-    """n, Σx, Σx², Σd, Σd² with d = y − x, where both are there; taken from the first values to save digits."""
-    n = 0
-    sum_x, sum_xx, sum_d, sum_dd = 0.0, 0.0, 0.0, 0.0
-    x_origin, d_origin = 0.0, 0.0
+def _added(x: npt.NDArray[np.float64], y: npt.NDArray[np.float64], before: _Sums) -> _Sums:
+    """The sums with more samples."""
+    n, x_origin, d_origin, sum_x, sum_xx, sum_d, sum_dd = before
     for i in range(x.size):
         d = float(y[i]) - float(x[i])
         if d != d:
@@ -226,4 +240,4 @@ def _sums(x: npt.NDArray[np.float64], y: npt.NDArray[np.float64]) -> tuple[int, 
         sum_xx += x_here * x_here
         sum_d += d
         sum_dd += d * d
-    return n, sum_x, sum_xx, sum_d, sum_dd
+    return _Sums(n, x_origin, d_origin, sum_x, sum_xx, sum_d, sum_dd)

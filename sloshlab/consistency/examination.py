@@ -8,13 +8,11 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
 from sloshlab.conditioning.calibration import DryMass
-from sloshlab.conditioning.combined_channels import (
-    mean_acceleration,
-    total_force,
-)
+from sloshlab.conditioning.combined_channels import TankSignals, tank_signals
 from sloshlab.conditioning.gaps import sampling_step_s
 from sloshlab.configurations import FROZEN, SLOSHING
 from sloshlab.consistency.between_runs import (
@@ -35,11 +33,13 @@ from sloshlab.consistency.series import SensorSeries, sensor_series
 from sloshlab.consistency.statement import law_finding, level_finding
 from sloshlab.errors import AnalysisError
 from sloshlab.experiments import EXPERIMENTS, OTHER
+from sloshlab.out_of_core import blocks
 from sloshlab.recording import channels
 from sloshlab.rig import Rig
 
 _READABLE: Final = (1e-100, 1e100)
 """Magnitudes of which squares and products are numbers; no sensor reads others."""
+_NO_RIG: Final = OpenPoint("force against acceleration with the liquid at rest", "no rig is given")
 
 
 @dataclass(frozen=True)
@@ -96,17 +96,25 @@ def examined(
 def _beyond_computing(recording: xr.Dataset) -> str:
     """The first channel whose largest reading is no magnitude to compute with; empty if all are."""
     for name in channels(recording):
-        largest = float(np.nanmax(np.abs(recording[name].values), initial=0.0))
+        largest = _largest_magnitude(recording[name].values)
         if largest and not _READABLE[0] <= largest <= _READABLE[1]:
             return name
     return ""
 
 
+def _largest_magnitude(values: npt.NDArray[np.floating]) -> float:
+    """Of the values that are not NaN, 0 if none is."""
+    largest = 0.0
+    for part in blocks(values.size, values):
+        highest, lowest = np.fmax.reduce(values[part]), np.fmin.reduce(values[part])
+        largest = float(np.fmax(largest, np.fmax(highest, -lowest)))
+    return largest
+
+
 def _of_carried_tank(recording: xr.Dataset, rig: Rig | None) -> tuple[list[Finding], list[OpenPoint]]:
     """Force on a tank that a structure carries, against its acceleration, where the liquid is still."""
     try:
-        total_force(recording)
-        mean_acceleration(recording)
+        tank = tank_signals(recording)
     except AnalysisError:
         return [], []
     if rig is None or recording.attrs.get("configuration") == SLOSHING:
@@ -115,29 +123,35 @@ def _of_carried_tank(recording: xr.Dataset, rig: Rig | None) -> tuple[list[Findi
         ]
     frozen = recording.attrs.get("configuration") == FROZEN
     believed_kg = rig.tank.dry_mass_kg + (rig.liquid_mass_kg if frozen else 0.0)
-    return carried_mass_findings(still_response(recording), believed_kg, Inertia.of(rig, math.nan)), []
+    return carried_mass_findings(still_response(tank), believed_kg, Inertia.of(rig, math.nan)), []
 
 
 def _examined_on_shaker(
     result: ConsistencyExamination, recording: xr.Dataset, known: Reference, *, is_modulated: bool
 ) -> ConsistencyExamination:
     try:
-        reference_series = _against_acceleration(recording)
+        tank = tank_signals(recording)
+        reference_series = _against_acceleration(tank)
     except AnalysisError as error:
         return result.with_findings((), (OpenPoint("sensors against each other and against physics", str(error)),))
     inertia = Inertia.of(known.rig, _highest_hz(reference_series))
-    series, missing = compared_series(recording)
+    series, missing = compared_series(recording, tank.acceleration)
     found: list[Finding] = []
     for one, share in series:
         found += examined_pair(one, share, inertia, sampling_step_s(recording))
     found += sensor_findings(series, known.still_series, inertia)
-    found += noise_findings(recording, inertia, reference_series)
+    found += noise_findings(recording, tank.acceleration, inertia, reference_series)
     if not is_modulated:
         found += [
-            finding for finding in (level_finding(recording), law_finding(recording, reference_series)) if finding
+            finding
+            for finding in (level_finding(recording, tank.acceleration), law_finding(recording, reference_series))
+            if finding
         ]
-    start = start_response(recording) if recording.attrs.get("configuration") == SLOSHING else None
-    more, not_checked = _of_force(recording, known, inertia, reference_series, start)
+    if recording.attrs.get("configuration") != SLOSHING:
+        more, not_checked = _of_still_force(tank, known, inertia)
+        return result.with_findings(found + more, missing + not_checked)
+    start = start_response(tank)
+    more, not_checked = _of_force(tank, known, inertia, reference_series, start)
     return replace(result.with_findings(found + more, missing + not_checked), start=start)
 
 
@@ -147,23 +161,29 @@ def _of_like_sensors(recording: xr.Dataset, inertia: Inertia) -> tuple[list[Find
     return [finding for one, share in series for finding in examined_pair(one, share, inertia, step_s)], missing
 
 
+def _of_still_force(
+    tank: TankSignals, known: Reference, inertia: Inertia
+) -> tuple[list[Finding], list[OpenPoint]]:
+    """Force against acceleration of a run whose liquid does not move."""
+    if known.rig is None:
+        return [], [_NO_RIG]
+    return still_findings(still_response(tank), inertia), []
+
+
 def _of_force(
-    recording: xr.Dataset, known: Reference, inertia: Inertia, series: SensorSeries, start: ForceResponse | None
+    tank: TankSignals, known: Reference, inertia: Inertia, series: SensorSeries, start: ForceResponse | None
 ) -> tuple[list[Finding], list[OpenPoint]]:
     """Force against acceleration: over time, and where the liquid cannot move."""
     if known.rig is None:
-        return [], [OpenPoint("force against acceleration with the liquid at rest", "no rig is given")]
-    if recording.attrs.get("configuration") != SLOSHING:
-        return still_findings(still_response(recording), inertia), []
+        return [], [_NO_RIG]
     found = findings_over_time(series, inertia)
-    more, not_checked = start_findings(start, known.rig, known.dry, inertia, sampling_step_s(recording))
-    more += stop_findings(stop_response(recording), known.dry, inertia)
+    more, not_checked = start_findings(start, known.rig, known.dry, inertia, sampling_step_s(tank.force))
+    more += stop_findings(stop_response(tank), known.dry, inertia)
     return found + more, not_checked
 
 
-def _against_acceleration(recording: xr.Dataset) -> SensorSeries:
-    force = total_force(recording)
-    return sensor_series(force.to_dataset(), str(force.name), mean_acceleration(recording))
+def _against_acceleration(tank: TankSignals) -> SensorSeries:
+    return sensor_series(tank.force.to_dataset(), str(tank.force.name), tank.acceleration)
 
 
 def like_series(recording: xr.Dataset) -> tuple[SensorSeries, ...]:

@@ -13,6 +13,8 @@ import numpy.typing as npt
 import xarray as xr
 
 from sloshlab.consistency.force_response import ForceResponse
+from sloshlab.out_of_core import blocks, empty
+from sloshlab.recording import with_values
 
 BoolArray = npt.NDArray[np.bool_]
 
@@ -181,9 +183,13 @@ class ConsistencyExamination:
         """The recording with NaN, as for lost samples, where nothing was measured; a copy if anything changes."""
         if not self.wrong_samples:
             return recording
-        masked = recording.copy()
+        masked = recording
         for name, samples in self.wrong_samples.items():
-            masked[name] = recording[name].where(~samples)
+            values = recording[name].values
+            measured = empty(values.size, np.result_type(values, np.float32))
+            for part in blocks(values.size, values, measured):
+                measured[part] = np.where(samples[part], np.nan, values[part])
+            masked = with_values(masked, name, measured)
         return masked
 
 

@@ -13,12 +13,13 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
 from scipy.signal import hilbert
 
-from sloshlab.conditioning.combined_channels import mean_acceleration, total_force
+from sloshlab.conditioning.combined_channels import TankSignals
 from sloshlab.conditioning.gaps import sampling_step_s
+from sloshlab.conditioning.quality import sample_statistics
 from sloshlab.constants import GRAVITY_M_PER_S2
+from sloshlab.out_of_core import blocks
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -59,23 +60,21 @@ class ForceResponse:
     stop_s: float
 
 
-def start_response(recording: xr.Dataset) -> ForceResponse | None:
+def start_response(tank: TankSignals) -> ForceResponse | None:
     """Response in the quiet start of a run; None if the run does not begin at rest or is quiet for too short."""
-    acceleration = mean_acceleration(recording).values
-    stretch = quiet_start(acceleration, sampling_step_s(recording))
-    return None if stretch is None else _response(recording, acceleration, stretch)
+    stretch = quiet_start(tank.acceleration.values)
+    return None if stretch is None else _response(tank, stretch)
 
 
-def stop_response(recording: xr.Dataset) -> ForceResponse | None:
+def stop_response(tank: TankSignals) -> ForceResponse | None:
     """Response while the motion dies away at the end of a run; None if it does not.
 
     The liquid still moves then, by itself: what it gives and takes is bounded, not absent.
     """
-    acceleration = mean_acceleration(recording).values
-    there = np.isfinite(acceleration)
-    if not there.any():
+    acceleration = tank.acceleration.values
+    n_there, mean = _mean(acceleration)
+    if not n_there:
         return None
-    mean = _mean(acceleration, there)
     n_after = _n_weak(acceleration[::-1], mean)
     if n_after == acceleration.size:
         return None
@@ -83,45 +82,46 @@ def stop_response(recording: xr.Dataset) -> ForceResponse | None:
     left = np.abs(_moved(acceleration[stretch], mean))
     if left.size < _FEWEST_SAMPLES or left[-max(left.size // 10, 4) :].max() > _AT_REST * left.max():
         return None
-    return _response(recording, acceleration, stretch)
+    return _response(tank, stretch)
 
 
-def still_response(recording: xr.Dataset) -> ForceResponse | None:
+def still_response(tank: TankSignals) -> ForceResponse | None:
     """Response of a run without liquid motion, of its first 60 000 samples at most."""
-    acceleration = mean_acceleration(recording).values
-    return _response(recording, acceleration, slice(0, min(acceleration.size, _LONGEST_RUN_SAMPLES)))
+    return _response(tank, slice(0, min(tank.acceleration.size, _LONGEST_RUN_SAMPLES)))
 
 
-def quiet_start(acceleration: npt.NDArray[np.floating], step_s: float) -> slice | None:
+def quiet_start(acceleration: npt.NDArray[np.floating]) -> slice | None:
     """Samples from the beginning until the liquid may have begun to move; None where it may have moved before.
 
     Parameters
     ----------
     acceleration : ndarray, shape (n_samples,)
         Of the tank [m/s²], NaN where lost.
-    step_s : float
-        Sampling step.
     """
-    there = np.isfinite(acceleration)
-    if there.sum() < _FEWEST_SAMPLES:
+    n_there, mean = _mean(acceleration)
+    if n_there < _FEWEST_SAMPLES:
         return None
-    mean = _mean(acceleration, there)
-    moved = _moved(acceleration[: _n_weak(acceleration, mean)], mean)
-    stop = _cycles_end(moved)
+    stop = _cycles_end(acceleration[: _n_weak(acceleration, mean)], mean)
     if stop < _FEWEST_SAMPLES:
         return None
-    largest = float(np.abs(moved[:stop]).max())
-    beginning = float(np.abs(moved[: max(stop // 10, 4)]).max())
+    largest = _largest(acceleration[:stop], mean)
+    beginning = _largest(acceleration[: max(stop // 10, 4)], mean)
     # a run that was already in motion when the recorder started has liquid that is in motion
     if largest == 0 or beginning > _AT_REST * largest:
         return None
     return slice(0, stop)
 
 
-def _mean(acceleration: npt.NDArray[np.floating], there: npt.NDArray[np.bool_]) -> np.float64:
-    """Mean of the samples that are there, of which there is one at least."""
-    everything = bool(there.all())
-    return np.float64(np.mean(acceleration if everything else acceleration[there], dtype=np.float64))
+def _mean(acceleration: npt.NDArray[np.floating]) -> tuple[int, np.float64]:
+    """How many samples are there, and their mean."""
+    n, _, _, mean, _ = sample_statistics(acceleration)
+    return n, np.float64(mean)
+
+
+def _largest(acceleration: npt.NDArray[np.floating], mean: np.float64) -> float:
+    """Largest magnitude about the mean; 0 without a sample."""
+    parts = blocks(acceleration.size, acceleration)
+    return max((float(np.abs(_moved(acceleration[part], mean)).max()) for part in parts), default=0.0)
 
 
 def _moved(acceleration: npt.NDArray[np.floating], mean: np.float64) -> FloatArray:
@@ -132,37 +132,39 @@ def _moved(acceleration: npt.NDArray[np.floating], mean: np.float64) -> FloatArr
 def _n_weak(acceleration: npt.NDArray[np.floating], mean: np.float64) -> int:
     """Samples before the first at which the liquid may leave the floor."""
     # in blocks: most runs lift the liquid early, and what comes after is not looked at
-    for start in range(0, acceleration.size, _SAMPLES_AT_ONCE):
-        block = _moved(acceleration[start : start + _SAMPLES_AT_ONCE], mean)
-        strong = np.flatnonzero(np.abs(block) > _LIFT_OFF * GRAVITY_M_PER_S2)
+    for part in blocks(acceleration.size, acceleration, of=_SAMPLES_AT_ONCE):
+        strong = np.flatnonzero(np.abs(_moved(acceleration[part], mean)) > _LIFT_OFF * GRAVITY_M_PER_S2)
         if strong.size:
-            return start + int(strong[0])
+            return int(part.start + strong[0])
     return acceleration.size
 
 
-def _cycles_end(moved: FloatArray) -> int:
-    """Sample at which the motion has gone through the longest start that is allowed."""
-    if moved.size == 0:
-        return 0
+def _cycles_end(acceleration: npt.NDArray[np.floating], mean: np.float64) -> int:
+    """Sample at which the motion has gone through the longest start that is allowed; its end if it does not."""
     # a hysteresis of a tenth: noise at rest does not count as cycles
-    level = 0.1 * float(np.abs(moved).max())
-    above = moved > level
-    risen = np.flatnonzero(above[1:] & ~above[:-1])
-    below = np.flatnonzero(moved < -level)
-    if risen.size == 0 or below.size == 0:
-        return moved.size
-    # rises that follow a fall below −level, one per cycle
-    at = np.searchsorted(below, risen)
-    fresh = np.concatenate([[True], np.diff(at) > 0])
-    cycles = risen[fresh]
-    return int(cycles[_LONGEST_START_CYCLES]) if cycles.size > _LONGEST_START_CYCLES else moved.size
+    level = 0.1 * _largest(acceleration, mean)
+    n_cycles, is_above, is_fresh = 0, True, True
+    for part in blocks(acceleration.size, acceleration):
+        moved = _moved(acceleration[part], mean)
+        above, below = moved > level, moved < -level
+        # only where the motion rises above the level, or falls below −level, does anything change
+        risen = above & ~np.concatenate([[is_above], above[:-1]])
+        fallen = below & ~np.concatenate([[False], below[:-1]])
+        is_above = bool(above[-1])
+        for i in np.flatnonzero(risen | fallen).tolist():
+            if fallen[i]:
+                is_fresh = True
+            elif is_fresh:
+                # rises that follow a fall, one per cycle, and the first; counted from the sample before each
+                n_cycles, is_fresh = n_cycles + 1, False
+                if n_cycles > _LONGEST_START_CYCLES:
+                    return int(part.start) + i - 1
+    return acceleration.size
 
 
-def _response(
-    recording: xr.Dataset, acceleration: npt.NDArray[np.floating], stretch: slice
-) -> ForceResponse | None:
-    step_s = sampling_step_s(recording)
-    force = np.asarray(total_force(recording.isel(time=stretch)).values, dtype=np.float64)
+def _response(tank: TankSignals, stretch: slice) -> ForceResponse | None:
+    acceleration, step_s = tank.acceleration.values, sampling_step_s(tank.acceleration)
+    force = np.asarray(tank.force.values[stretch], dtype=np.float64)
     motion = np.asarray(acceleration[stretch], dtype=np.float64)
     jerk = np.gradient(motion, step_s)
     there = np.isfinite(force + motion + jerk)
@@ -183,7 +185,7 @@ def _response(
         return None
     # F = M cos ωτ ü − M sin(ωτ)/ω u⃛ at the frequency of the stretch
     mass = float(math.hypot(solution[0], solution[1] * omega))
-    time = recording["time"].values[stretch]
+    time = tank.acceleration["time"].values[stretch]
     return ForceResponse(
         mass_kg=mass,
         mass_std_kg=float(std[0]),

@@ -30,8 +30,16 @@ _SMALLEST_STEP_SAMPLES: Final = 0.1
 """A smaller step of a delay cannot be samples that were lost."""
 
 
-def compared_series(recording: xr.Dataset) -> tuple[list[tuple[SensorSeries, float]], list[OpenPoint]]:
+def compared_series(
+    recording: xr.Dataset, acceleration: xr.DataArray | None = None
+) -> tuple[list[tuple[SensorSeries, float]], list[OpenPoint]]:
     """Every series of like sensors with the share that the second has in what is analysed.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+    acceleration : xarray.DataArray, optional
+        `mean_acceleration` of it, if it is known.
 
     Returns
     -------
@@ -55,19 +63,21 @@ def compared_series(recording: xr.Dataset) -> tuple[list[tuple[SensorSeries, flo
         for _, names in groups:
             share = 1.0 / len(names)
             series += [(sensor_series(recording, name, recording[names[0]]), share) for name in names[1:]]
-        series += _spare_accelerometers(recording)
+        series += _spare_accelerometers(recording, acceleration)
     except AnalysisError as error:
         missing.append(OpenPoint("like sensors against each other", str(error)))
     return series, missing
 
 
-def _spare_accelerometers(recording: xr.Dataset) -> list[tuple[SensorSeries, float]]:
+def _spare_accelerometers(
+    recording: xr.Dataset, acceleration: xr.DataArray | None
+) -> list[tuple[SensorSeries, float]]:
     """Accelerometers of the same rigid tank that are not analysed themselves."""
     redundant = redundant_accelerometers(recording)
     if len(redundant) < 2:
         return []
     used = acceleration_channels(recording)
-    mean = mean_acceleration(recording)
+    mean = mean_acceleration(recording) if acceleration is None else acceleration
     return [(sensor_series(recording, name, mean), 1.0) for name in redundant if name not in used]
 
 

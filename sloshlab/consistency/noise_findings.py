@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 import xarray as xr
 
-from sloshlab.conditioning.combined_channels import acceleration_channels, force_channels, mean_acceleration
+from sloshlab.conditioning.combined_channels import acceleration_channels, force_channels
 from sloshlab.conditioning.gaps import sampling_step_s
 from sloshlab.conditioning.quality import sample_statistics
 from sloshlab.consistency.effect import Inertia
@@ -23,19 +23,23 @@ _WINDOW_CYCLES: Final = 12
 """Of the usual windows, over which noise averages."""
 
 
-def noise_findings(recording: xr.Dataset, inertia: Inertia, series: SensorSeries) -> list[Finding]:
+def noise_findings(
+    recording: xr.Dataset, acceleration: xr.DataArray, inertia: Inertia, series: SensorSeries
+) -> list[Finding]:
     """More noise than stated, and characteristics that flatten, of like sensors in pairs.
 
     Parameters
     ----------
     recording : xarray.Dataset
+    acceleration : xarray.DataArray
+        `mean_acceleration` of it.
     inertia : Inertia
     series : SensorSeries
         Of the force against the acceleration, for the frequencies of the run.
     """
     found: list[Finding] = []
     n_per_block = round(1.0 / sampling_step_s(recording))
-    w_bar_std = _w_bar_std_of_noise(recording, inertia, series)
+    w_bar_std = _w_bar_std_of_noise(acceleration, inertia, series)
     # noise of a force counts as it is, that of one accelerometer by its share in ü, times the mass
     groups = ((force_channels(recording), 1.0), (acceleration_channels(recording), inertia.total_kg))
     for names, force_per_unit in groups:
@@ -70,14 +74,14 @@ def _compression(name: str, pair: PairNoise, inertia: Inertia, share: float) -> 
     return [contradiction("linearity", what, (name,), effect=effect)]
 
 
-def _w_bar_std_of_noise(recording: xr.Dataset, inertia: Inertia, series: SensorSeries) -> float:
+def _w_bar_std_of_noise(acceleration: xr.DataArray, inertia: Inertia, series: SensorSeries) -> float:
     """Standard deviation of W̄ of a window for white noise of 1 N on the force.
 
     The work of a cycle is ∑ F u̇ Δt, so that noise σ gives σ (Ωu₀/√2) √(T Δt); W̄ divides by m_l (Ωu₀)².
     """
     omega = float(np.median(series.omega_rad_per_s))
-    *_, acceleration_std = sample_statistics(mean_acceleration(recording).values)
+    *_, acceleration_std = sample_statistics(acceleration.values)
     velocity = math.sqrt(2.0) * acceleration_std / omega
     period = 2 * math.pi / omega
-    of_cycle = math.sqrt(0.5 * period * sampling_step_s(recording)) / (inertia.liquid_kg * velocity)
+    of_cycle = math.sqrt(0.5 * period * sampling_step_s(acceleration)) / (inertia.liquid_kg * velocity)
     return of_cycle / math.sqrt(_WINDOW_CYCLES)

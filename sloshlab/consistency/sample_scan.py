@@ -17,6 +17,8 @@ import numpy.typing as npt
 from numba import njit
 from numpy.lib.stride_tricks import sliding_window_view
 
+from sloshlab.out_of_core import release, release_behind
+
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.int64]
@@ -48,14 +50,18 @@ def prediction_error(values: FloatArray) -> FloatArray:
 
 
 def widened(mask: BoolArray, n: int) -> BoolArray:
-    """True where any of n samples about each is, the one more of an even n being before it."""
+    """True where any of n samples about each is, the one more of an even n being before it.
+
+    The mask itself if it is empty.
+    """
+    # most masks of most runs are
+    if not mask.any():
+        return mask
     wide = mask.copy()
-    # most masks of most runs are empty
-    if mask.any():
-        for k in range(1, n // 2 + 1):
-            wide[k:] |= mask[:-k]
-        for k in range(1, n - n // 2):
-            wide[:-k] |= mask[k:]
+    for k in range(1, n // 2 + 1):
+        wide[k:] |= mask[:-k]
+    for k in range(1, n - n // 2):
+        wide[:-k] |= mask[k:]
     return wide
 
 
@@ -113,6 +119,8 @@ class ScannedChannel:
             # with most errors larger, their median is larger, too
             is_bound = 2 * n_small < stop - first
             typical[k] = _SMALL_SHARE * largest_error[k] if is_bound else math.nan
+            release_behind(k, self.n_block, self._values)
+        release(self._values)
         if run + 1 >= SHORTEST_HOLD:
             runs.append(np.array([[self.size - run - 1, self.size]]))
         return ScanBounds(
@@ -158,7 +166,9 @@ class ScannedChannel:
 
     def _median(self, block: int) -> float:
         if block not in self._medians:
-            error = self.error(block * self.n_block, min((block + 1) * self.n_block, self.size))
+            part = slice(block * self.n_block, min((block + 1) * self.n_block, self.size))
+            error = self.error(part.start, part.stop)
+            release_behind(block, self.n_block, self._values)
             self._medians[block] = float(np.median(error**2))
         return self._medians[block]
 

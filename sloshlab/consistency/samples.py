@@ -27,6 +27,7 @@ from sloshlab.consistency.sample_scan import (
     widened,
 )
 from sloshlab.order_statistics import median, quantile_of_sorted
+from sloshlab.out_of_core import blocks
 from sloshlab.recording import channels
 
 FloatArray = npt.NDArray[np.float64]
@@ -119,11 +120,14 @@ def _suspicious(channel: xr.DataArray, scanned: Mapping[str, ScannedChannel]) ->
 
 def _largest_finite(values: npt.NDArray[np.floating]) -> float:
     """Magnitude of the largest value that is a number, 0 if none is."""
-    # NaN loses against any number, and nothing is copied
-    largest = float(np.fmax(np.fmax.reduce(values), -np.fmin.reduce(values)))
-    if math.isfinite(largest):
-        return largest
-    return float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
+    largest = 0.0
+    for part in blocks(values.size, values):
+        # NaN loses against any number, and nothing is copied
+        of_part = float(np.fmax(np.fmax.reduce(values[part]), -np.fmin.reduce(values[part])))
+        if not math.isfinite(of_part):
+            of_part = float(np.max(np.abs(values[part]), where=np.isfinite(values[part]), initial=0.0))
+        largest = max(largest, of_part)
+    return largest
 
 
 def _found(check: str, name: str, samples: BoolArray, time: FloatArray) -> Finding:

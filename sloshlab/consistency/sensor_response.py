@@ -16,6 +16,7 @@ import numpy.typing as npt
 from numba import njit
 
 from sloshlab.consistency.samples import WHITE_GAIN
+from sloshlab.out_of_core import release_behind
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -110,12 +111,14 @@ class _Blocks:
             _predicted_wrong(samples, error)
             error[:at] = 0.0
             error[max(self._signals[0].size - 2 - start, 0) :] = 0.0
+            release_behind(block, self.n, signal)
         y, x = self._samples[:, 2:-2]
         return y, x, self._errors[0], self._errors[1]
 
     def readings(self, block: int) -> FloatArray:
         """y in a block, shape (n,), in double precision."""
-        return np.asarray(self._signals[0][block * self.n : (block + 1) * self.n], dtype=np.float64)
+        release_behind(block, self.n, self._signals[0])
+        return np.array(self._signals[0][block * self.n : (block + 1) * self.n], dtype=np.float64)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -86,8 +86,7 @@ def sensor_series(recording: xr.Dataset, name: str, reference: xr.DataArray) -> 
     AnalysisError
         If the run is too short, has no block without lost samples, or no motion.
     """
-    x = np.asarray(reference.values, dtype=np.float64)
-    spectra = block_spectra(recording, [name], x)
+    spectra = block_spectra(recording, [name], reference.values)
     there = spectra.power > _WEAK_BLOCK * np.median(spectra.power)
     cross, power = spectra.cross[0][there], spectra.power[there]
     omega = spectra.omega_rad_per_s[there]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from typing import Final
 
@@ -10,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from sloshlab.conditioning.combined_channels import mean_acceleration
 from sloshlab.conditioning.gaps import sampling_step_s
 from sloshlab.consistency.finding import Finding, contradiction
 from sloshlab.consistency.series import SensorSeries
 from sloshlab.constants import GRAVITY_M_PER_S2
+from sloshlab.out_of_core import blocks
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -27,29 +26,27 @@ _UPPER_LEVEL: Final = 0.95
 """Quantile of the levels of the blocks that stands for that of a run: parts of it are limited by the stroke."""
 
 
-def level_finding(recording: xr.Dataset) -> Finding | None:
-    """`acceleration_g` against the amplitude of the acceleration."""
+def level_finding(recording: xr.Dataset, acceleration: xr.DataArray) -> Finding | None:
+    """`acceleration_g` of a recording against the amplitude of the tank's acceleration."""
     stated = recording.attrs.get("acceleration_g")
     if not isinstance(stated, int | float) or not stated > 0:
         return None
-    measured = measured_level_g(recording)
+    measured = measured_level_g(acceleration)
     if not math.isfinite(measured) or abs(measured / stated - 1) <= _LEVEL_TOLERANCE:
         return None
     what = f"the tank moves at {measured:.3g} g, the attribute acceleration_g says {stated:g}"
     return contradiction("stated level", what)
 
 
-def measured_level_g(recording: xr.Dataset) -> float:
+def measured_level_g(tank: xr.DataArray) -> float:
     """Amplitude of the tank's acceleration in blocks of a second, the level that is kept or reached [g]."""
-    acceleration = mean_acceleration(recording).values
-    n = max(round(1.0 / sampling_step_s(recording)), 16)
+    acceleration = tank.values
+    n = max(round(1.0 / sampling_step_s(tank)), 16)
     n_blocks = acceleration.size // n
     if n_blocks < 4:
         return math.nan
-    blocks = acceleration[: n_blocks * n].reshape(n_blocks, n)
-    # one after the other, so that what is computed of each stays in the cache
-    whole = itertools.compress(blocks, np.isfinite(blocks).all(axis=1))
-    levels = [math.sqrt(2.0) * float(np.std(block, dtype=np.float64)) for block in whole]
+    seconds = (acceleration[part] for part in blocks(n_blocks * n, acceleration, of=n))
+    levels = [math.sqrt(2.0) * float(np.std(one, dtype=np.float64)) for one in seconds if np.isfinite(one).all()]
     return float(np.quantile(levels, _UPPER_LEVEL)) / GRAVITY_M_PER_S2 if levels else math.nan
 
 

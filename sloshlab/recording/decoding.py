@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -10,6 +10,7 @@ import xarray as xr
 
 from sloshlab import limited_process
 from sloshlab.errors import RecordingError
+from sloshlab.out_of_core import blocks
 from sloshlab.recording.attributes import (
     RunAttributes,
     attributes_of,
@@ -63,7 +64,8 @@ def decoded(source: Any, name: str, maximum_decoded_bytes: int) -> xr.Dataset:
     if units not in ("s", "second", "seconds"):
         raise RecordingError(f"{name}: units of time", got=repr(units), allowed="'s', seconds from the trigger")
     time = limited_process.empty(n_samples, np.float64)
-    time[:] = time_variable[:]
+    for part in _stored_blocks(time_variable, time):
+        time[part] = time_variable[part]
     require_uniform_time(time, attributes.sampling_rate_hz, name)
     variables: dict[str, xr.Variable] = {}
     for channel, variable in source.variables.items():
@@ -78,7 +80,7 @@ def decoded(source: Any, name: str, maximum_decoded_bytes: int) -> xr.Dataset:
             variables[channel] = _decoded_channel(channel, variable, its_attributes, name)
         elif np.dtype(variable.dtype).kind in "fiub" or variable.dtype is str:
             stored = {key: value for key, value in its_attributes.items() if key != "_FillValue"}
-            variables[channel] = xr.Variable(variable.dimensions, variable[...], stored)
+            variables[channel] = xr.Variable(variable.dimensions, _as_stored(variable), stored)
     if not any("quantity" in variable.attrs for variable in variables.values()):
         raise no_channel(name)
     recording = xr.Dataset(variables, coords=time_coordinate(time), attrs=attributes_of(source))
@@ -139,19 +141,33 @@ def _decoded_values(variable: Any, scale: float, offset: float, fill: float | No
     # 24 bits of precision are enough for 16 of a converter, unless a large offset takes them
     few_bits = stored.kind in "iu" and stored.itemsize <= 2 and abs(offset) <= 2**15 * abs(scale)
     values = limited_process.empty(len(variable), np.float32 if few_bits or stored == np.float32 else np.float64)
-    storage = variable.chunking()
-    block = storage[0] if isinstance(storage, list) else _DECODING_BLOCK
-    # whole storage chunks, or each would be decompressed twice
-    block = max(block, _DECODING_BLOCK // block * block)
-    for start in range(0, values.size, block):
-        raw = variable[start : start + block]
-        part = values[start : start + block]
+    for at in _stored_blocks(variable, values):
+        raw, part = variable[at], values[at]
         np.multiply(raw, values.dtype.type(scale), out=part, dtype=values.dtype)
         if offset:
             np.add(part, values.dtype.type(offset), out=part)
         if fill is not None:
             part[raw == fill] = np.nan
     return values
+
+
+def _as_stored(variable: Any) -> np.ndarray:
+    """Values of a variable that is no channel, those over time block by block."""
+    if variable.dimensions != ("time",) or variable.dtype is str:
+        return np.asarray(variable[...])
+    values = limited_process.empty(len(variable), variable.dtype)
+    for part in _stored_blocks(variable, values):
+        values[part] = variable[part]
+    return values
+
+
+def _stored_blocks(variable: Any, values: np.ndarray) -> Iterator[slice]:
+    """Parts of a variable over time as it is stored; of its values only one is in memory where they are large."""
+    storage = variable.chunking()
+    # not more at once than a file may declare as one chunk
+    block = min(storage[0], len(variable)) if isinstance(storage, list) else _DECODING_BLOCK
+    # whole storage chunks, or each would be decompressed twice
+    return blocks(len(variable), values, of=max(block, _DECODING_BLOCK // block * block))
 
 
 def _number(attributes: Mapping[str, Any], key: str, default: float, channel: str, name: str) -> float:

@@ -9,12 +9,10 @@ import numpy as np
 import xarray as xr
 
 from sloshlab.errors import RecordingError
+from sloshlab.out_of_core import blocks
 
 JITTER_ALLOWED_STEPS: Final = 1e-6
 """Largest deviation of the time coordinate from a uniform one, in steps."""
-
-# Times are checked part by part, so that no copy of a long coordinate is made.
-_TIME_CHUNK = 1 << 18
 
 
 def time_coordinate(time: np.ndarray) -> xr.Coordinates:
@@ -26,8 +24,9 @@ def time_coordinate(time: np.ndarray) -> xr.Coordinates:
 
 
 def _chunks(values: np.ndarray) -> Iterable[tuple[int, np.ndarray]]:
-    for start in range(0, values.size, _TIME_CHUNK):
-        yield start, values[start : start + _TIME_CHUNK]
+    # part by part, so that no copy of a long coordinate is made
+    for part in blocks(values.size, values):
+        yield part.start, values[part]
 
 
 def require_uniform_time(time: np.ndarray, rate_hz: float, name: str) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from sloshlab.errors import RecordingError
+from sloshlab.out_of_core import blocks
 from sloshlab.recording.attributes import RunAttributes, channel_attributes, factor_to_si_of, run_attributes
 from sloshlab.recording.channel_access import channels, is_channel
 from sloshlab.recording.quality_bits import LOST
@@ -54,21 +55,28 @@ def require_lost_flagged(recording: xr.Dataset, name: str) -> None:
     flags = recording.get("quality")
     if flags is not None and (flags.dims != ("time",) or flags.dtype.kind not in "ui"):
         raise RecordingError(f"{name}: quality", got=f"{flags.dtype}{flags.dims}", allowed="uint8(time)")
+    lost = None if flags is None else flags.values
     for channel in channels(recording):
         values = recording[channel].values
-        # one pass without an array of flags; most channels are whole
-        if np.isfinite(values.sum()):
-            continue
-        not_finite = ~np.isfinite(values)
-        if np.isinf(values[not_finite]).any():
-            raise RecordingError(f"{name}: {channel}", got="infinite values", allowed="numbers, NaN where lost")
-        unflagged = not_finite if flags is None else not_finite & ((flags.values & LOST) == 0)
-        count = int(unflagged.sum())
-        if count:
-            at = float(recording["time"].values[int(unflagged.argmax())])
+        unflagged, first = 0, 0
+        for part in blocks(values.size, values, *([] if lost is None else [lost])):
+            # one pass without an array of flags; most blocks are whole
+            if np.isfinite(values[part].sum()):
+                continue
+            not_finite = ~np.isfinite(values[part])
+            if np.isinf(values[part][not_finite]).any():
+                raise RecordingError(
+                    f"{name}: {channel}", got="infinite values", allowed="numbers, NaN where lost"
+                )
+            wrong = not_finite if lost is None else not_finite & ((lost[part] & LOST) == 0)
+            if not unflagged:
+                first = part.start + int(wrong.argmax())
+            unflagged += int(wrong.sum())
+        if unflagged:
+            at = float(recording["time"].values[first])
             raise RecordingError(
                 f"{name}: {channel}",
-                got=f"{count} NaN samples that are not flagged as lost, the first at {at:.6g} s",
+                got=f"{unflagged} NaN samples that are not flagged as lost, the first at {at:.6g} s",
                 allowed="NaN only where `quality` has bit 1 (lost)",
                 remedy="flag them in `quality`, or find out where they come from",
             )

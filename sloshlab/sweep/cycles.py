@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from sloshlab.out_of_core import blocks, release
 from sloshlab.quadrature import MARGIN_SAMPLES, STEP_WEIGHTS, boundary_weights
 
 FloatArray = npt.NDArray[np.float64]
@@ -25,6 +26,8 @@ BoolArray = npt.NDArray[np.bool_]
 N_HARMONICS = 5
 """Harmonics 1 … 5 of the excitation frequency are kept."""
 
+_CYCLES_AT_ONCE = 512
+"""About a minute; their samples are in memory together."""
 _WORK, _MEAN, _SQUARE, _HIGHEST, _LOWEST = 0, 1, 2, 3, 4
 _N_SCALARS = 5
 
@@ -158,7 +161,15 @@ def evaluate_cycles(
         inertia_kg,
         motion_is_velocity,
     )
-    scalars, phasors = _kernel(signals, positions, slope, inside & long_enough)
+    n_cycles = positions.size - 1
+    scalars = np.full((n_cycles, _N_SCALARS), np.nan)
+    phasors = np.full((n_cycles, 2 * N_HARMONICS + 3), np.nan + 0j)
+    for part in blocks(n_cycles, of=_CYCLES_AT_ONCE):
+        _kernel(signals, positions, slope, inside & long_enough, part.start, part.stop, scalars, phasors)
+        # of a shorter cycle than before, some samples are touched again
+        touched = slice(max(int(positions[part.start]) - 8, 0), max(int(positions[part.stop]), 0))
+        for array in (force, motion, signals.unusable):
+            release(array[touched])
     return Cycles(
         start_s=np.asarray(boundaries_s[:-1]),
         stop_s=np.asarray(boundaries_s[1:]),
@@ -201,12 +212,17 @@ class _Cycle(NamedTuple):
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _kernel(
-    signals: _Signals, positions: FloatArray, slope: FloatArray, evaluable: BoolArray
-) -> tuple[FloatArray, ComplexArray]:
-    n_cycles = positions.size - 1
-    scalars = np.full((n_cycles, _N_SCALARS), np.nan)
-    phasors = np.full((n_cycles, 2 * N_HARMONICS + 3), np.nan + 0j)
-    for n in range(n_cycles):
+    signals: _Signals,
+    positions: FloatArray,
+    slope: FloatArray,
+    evaluable: BoolArray,
+    first: int,
+    stop: int,
+    scalars: FloatArray,
+    phasors: ComplexArray,
+) -> None:
+    """Evaluate cycles in [first, stop), each into its row."""
+    for n in range(first, stop):
         if evaluable[n] and _complete(signals, positions[n], positions[n + 1]):
             cycle = _Cycle(
                 positions[n],
@@ -217,7 +233,6 @@ def _kernel(
                 n % 2,
             )
             _evaluate_cycle(signals, cycle, scalars[n], phasors[n])
-    return scalars, phasors
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

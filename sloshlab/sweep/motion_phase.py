@@ -19,6 +19,7 @@ from scipy.fft import next_fast_len
 from scipy.interpolate import CubicSpline
 
 from sloshlab.errors import AnalysisError
+from sloshlab.out_of_core import blocks, empty, release
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -31,6 +32,8 @@ _CYCLES_PER_BLOCK = 8.0
 """Of the spectra that tell the frequency to begin with."""
 _BLOCKS_AT_ONCE = 16
 """Blocks overlap by half and are padded to four times their length: those of a long recording come in portions."""
+_KNOTS_AT_ONCE = 4096
+"""Some minutes of motion."""
 _STRONG_LINE = 0.4
 """The fundamental has at least this part of the largest line of a block."""
 _LOBE_LINES = 13
@@ -139,7 +142,7 @@ def measured_phase(
         # over all knots, as the window needs a frequency everywhere; the last spline has the moving ones only
         spline = CubicSpline(times, phase)
         window_s = _WINDOW_CYCLES * 2 * np.pi / np.maximum(spline(times, 1), 1e-6)
-        z, power, lost = _demodulated(
+        z, power, lost = _demodulated_in_groups(
             decimated, weight, rate_hz, _Knots(times, window_s), _PhaseSpline(spline.c, spline.x)
         )
         amplitude = np.abs(z)
@@ -171,21 +174,27 @@ def _averaged_down(
     # whole factors: a block mean is symmetric and has no phase error, only the delay of half a block that is
     # returned
     factor = max(1, int(sampling_rate_hz // _DEMODULATION_RATE_HZ))
-    n_blocks = motion.size // factor
-    trimmed = motion[: n_blocks * factor].reshape(n_blocks, factor)
-    # double precision in the sums only, so that a channel of single precision is not copied
-    mean = trimmed.mean(axis=1, dtype=np.float64)
-    good = np.isfinite(mean)
-    if usable is not None:
-        good &= usable[: n_blocks * factor].reshape(n_blocks, factor).all(axis=1)
-    if good.sum() < 16:
-        raise AnalysisError(
-            "motion", got=f"{int(good.sum())} usable samples", allowed="at least 16", remedy="record again"
-        )
-    mean = mean - mean[good].mean()
-    # zero is the mean by now: lost samples neither add nor take away, and the weights tell that they are lost
-    mean[~good] = 0.0
-    return mean, good.astype(np.float64), sampling_rate_hz / factor, (factor - 1) / (2 * sampling_rate_hz)
+    n_means = motion.size // factor
+    mean, weight = empty(n_means, np.float64), empty(n_means, np.float64)
+    n_good, total = 0, 0.0
+    for part in blocks(n_means, mean, weight):
+        samples = slice(part.start * factor, part.stop * factor)
+        # double precision in the sums only, so that a channel of single precision is not copied
+        mean[part] = motion[samples].reshape(-1, factor).mean(axis=1, dtype=np.float64)
+        good = np.isfinite(mean[part])
+        if usable is not None:
+            good &= usable[samples].reshape(-1, factor).all(axis=1)
+            release(usable[samples])
+        weight[part] = good
+        n_good, total = n_good + int(good.sum()), total + float(mean[part][good].sum())
+        release(motion[samples])
+    if n_good < 16:
+        raise AnalysisError("motion", got=f"{n_good} usable samples", allowed="at least 16", remedy="record again")
+    for part in blocks(n_means, mean, weight):
+        mean[part] -= total / n_good
+        # zero is the mean by now: lost samples neither add nor take away, and the weights tell that they are lost
+        mean[part][weight[part] == 0] = 0.0
+    return mean, weight, sampling_rate_hz / factor, (factor - 1) / (2 * sampling_rate_hz)
 
 
 def _dominant_frequency(motion: FloatArray, weight: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray]:
@@ -207,10 +216,12 @@ def _block_peaks(
     """Centres and frequencies of the largest line of every half-overlapping block that is complete and moves."""
     # half overlapping, because a Hann window hardly sees what lies at the ends of a block
     starts = np.arange(0, max(1, motion.size - n_block + 1), max(1, n_block // 2))
-    peaks = [
-        _peaks(motion, weight, rate_hz, n_block, starts[first : first + _BLOCKS_AT_ONCE])
-        for first in range(0, starts.size, _BLOCKS_AT_ONCE)
-    ]
+    peaks = []
+    for first in range(0, starts.size, _BLOCKS_AT_ONCE):
+        together = starts[first : first + _BLOCKS_AT_ONCE]
+        peaks.append(_peaks(motion, weight, rate_hz, n_block, together))
+        for array in (motion, weight):
+            release(array[together[0] : together[-1] + n_block])
     frequency, height = (np.concatenate(part) for part in zip(*peaks, strict=True))
     good = height > _SMALLEST_RELATIVE_AMPLITUDE * height.max()
     if not good.any() or height.max() <= 0:
@@ -315,20 +326,41 @@ class _PhaseSpline(NamedTuple):
     breaks: FloatArray  # (n_pieces + 1,)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _demodulated(
+def _demodulated_in_groups(
     motion: FloatArray, weight: FloatArray, rate_hz: float, knots: _Knots, spline: _PhaseSpline
 ) -> tuple[npt.NDArray[np.complex128], FloatArray, BoolArray]:
-    """Amplitude, twice the mean of motion·e^{-jφ}, and mean square under a Hann window at each knot.
+    """`_demodulated` at all knots, of which only some have their samples in memory at a time."""
+    n = knots.times.size
+    z, power, lost = np.empty(n, dtype=np.complex128), np.empty(n), np.empty(n, dtype=np.bool_)
+    for part in blocks(n, of=_KNOTS_AT_ONCE):
+        z[part], power[part], lost[part] = _demodulated(
+            motion, weight, rate_hz, knots, spline, part.start, part.stop
+        )
+        for array in (motion, weight):
+            release(array[: min(int(knots.times[part.stop - 1] * rate_hz), array.size)])
+    return z, power, lost
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _demodulated(
+    motion: FloatArray,
+    weight: FloatArray,
+    rate_hz: float,
+    knots: _Knots,
+    spline: _PhaseSpline,
+    first_knot: int,
+    stop_knot: int,
+) -> tuple[npt.NDArray[np.complex128], FloatArray, BoolArray]:
+    """Amplitude, twice the mean of motion·e^{-jφ}, and mean square under a Hann window at each of some knots.
 
     The third result is True where samples were lost.
     """
     times, window_s, coefficients, breaks = knots.times, knots.window_s, spline.coefficients, spline.breaks
-    result = np.zeros(times.size, dtype=np.complex128)
-    power = np.zeros(times.size)
-    lost = np.zeros(times.size, dtype=np.bool_)
+    result = np.zeros(stop_knot - first_knot, dtype=np.complex128)
+    power = np.zeros(stop_knot - first_knot)
+    lost = np.zeros(stop_knot - first_knot, dtype=np.bool_)
     last_piece = breaks.size - 2
-    for k in range(times.size):
+    for k in range(first_knot, stop_knot):
         # symmetric about the knot, hence without delay
         half = 0.5 * window_s[k]
         first = max(0, int(np.ceil((times[k] - half) * rate_hz)))
@@ -355,8 +387,9 @@ def _demodulated(
         # The sum of a whole Hann window. Less means that the window reaches beyond the record, where it is no
         # longer symmetric and the phase is biased.
         expected = 0.5 * window_s[k] * rate_hz
-        lost[k] = norm == 0.0 or present < 0.999 * norm or norm < 0.98 * expected
+        at = k - first_knot
+        lost[at] = norm == 0.0 or present < 0.999 * norm or norm < 0.98 * expected
         if norm > 0.0:
-            result[k] = 2.0 * total / norm
-            power[k] = square / norm
+            result[at] = 2.0 * total / norm
+            power[at] = square / norm
     return result, power, lost

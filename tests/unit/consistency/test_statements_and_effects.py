@@ -11,6 +11,7 @@ from scipy.integrate import quad
 from shaken_tank import DRY_KG, LIQUID_KG, RATE_HZ, shifted, tank_run, with_channel
 
 from sloshlab.conditioning.calibration import identify_dry_mass
+from sloshlab.conditioning.combined_channels import tank_signals
 from sloshlab.consistency.between_runs import calibration_findings, sibling_findings
 from sloshlab.consistency.bounds import window_findings
 from sloshlab.consistency.effect import Inertia
@@ -264,8 +265,8 @@ def test_any_readings_end_in_an_examination(change, experiment, configuration):
 
 @pytest.mark.parametrize(("factor", "odd"), [(1.0, set()), (1.04, {"c"}), (0.95, {"c"})])
 def test_a_run_that_starts_unlike_its_siblings(factor, odd):
-    starts = {name: start_response(tank_run(seed=seed)) for seed, name in enumerate("abd")}
-    starts["c"] = start_response(changed(tank_run(seed=9), FORCES, lambda values: factor * values))
+    starts = {name: start_response(tank_signals(tank_run(seed=seed))) for seed, name in enumerate("abd")}
+    starts["c"] = start_response(tank_signals(changed(tank_run(seed=9), FORCES, lambda values: factor * values)))
     found = sibling_findings(starts, RIG, Inertia.of(RIG, 20.0))
     assert set(found) == odd
     # two runs do not tell which of them is odd
