@@ -18,6 +18,7 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _HEAP = b"GCOL\x01\x00\x00\x00"
 _HEAP_HEADER_BYTES = 16
 _OBJECT_HEADER = struct.Struct("<HHIQ")
+_SEARCHED_AT_ONCE = 16 << 20
 # Objects of a heap are padded to it.
 _ALIGNMENT = 8
 
@@ -87,11 +88,17 @@ def require_sound_heaps(path: str | os.PathLike[str], *, what: str) -> None:
 
 def _first_endless_heap(content: mmap.mmap) -> int:
     """Position of the first heap whose objects do not lead to its end; -1 if there is none."""
-    start = content.find(_HEAP)
-    while start >= 0:
-        if not _leads_to_its_end(content, start):
-            return start
-        start = content.find(_HEAP, start + len(_HEAP))
+    for begin in range(0, len(content), _SEARCHED_AT_ONCE):
+        # to the end of a name that begins in this part
+        end = min(begin + _SEARCHED_AT_ONCE + len(_HEAP) - 1, len(content))
+        start = content.find(_HEAP, begin, end)
+        while start >= 0:
+            if not _leads_to_its_end(content, start):
+                return start
+            start = content.find(_HEAP, start + len(_HEAP), end)
+        if hasattr(content, "madvise"):
+            # what was searched need not stay in memory
+            content.madvise(mmap.MADV_DONTNEED, begin, end - begin)
     return -1
 
 

@@ -2,7 +2,8 @@
 
 An array of more than `LARGEST_IN_MEMORY_BYTES` lies in a file without a name. It is an ordinary array, of which
 only those pages are in memory that somebody has touched; whoever goes through it in `blocks` gives them back after
-each, so that a recording of any length takes the memory of a few blocks. A short one is one block, by the same way.
+each, so that a recording of any length takes the memory of a few blocks. A short one is one block, in the same
+way.
 
 The file is in the folder for temporary files (`TMPDIR`), as large as the array, and gone with the last reference,
 also after a kill -9. Where there is no room for it, or no such file, the array is in memory.

@@ -168,7 +168,7 @@ class ScannedChannel:
         if block not in self._medians:
             part = slice(block * self.n_block, min((block + 1) * self.n_block, self.size))
             error = self.error(part.start, part.stop)
-            release_behind(block, self.n_block, self._values)
+            release(self._values[part])
             self._medians[block] = float(np.median(error**2))
         return self._medians[block]
 

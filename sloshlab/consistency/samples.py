@@ -27,7 +27,7 @@ from sloshlab.consistency.sample_scan import (
     widened,
 )
 from sloshlab.order_statistics import median, quantile_of_sorted
-from sloshlab.out_of_core import blocks
+from sloshlab.out_of_core import blocks, release
 from sloshlab.recording import channels
 
 FloatArray = npt.NDArray[np.float64]
@@ -105,6 +105,7 @@ def examined_samples(
             if check in checks and samples.any():
                 findings.append(_found(check, name, samples, time))
                 wrong[name] = wrong[name] | samples if name in wrong else samples
+        release(recording[name].values)
     return findings, wrong
 
 
