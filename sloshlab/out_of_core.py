@@ -28,8 +28,8 @@ LARGEST_IN_MEMORY_BYTES: Final = 4 << 20
 """A channel of 240 s at 10 kHz in single precision takes more than twice as much."""
 BLOCK_SAMPLES: Final = 1 << 18
 """Of one channel: two megabytes in double precision, which a processor's cache holds."""
-_TOGETHER_BYTES: Final = max(1 << 16, mmap.PAGESIZE)
-"""Linux maps so much around a page that is touched (fault_around_bytes)."""
+_TOGETHER_BYTES: Final = 2 << 20
+"""Linux keeps files in pieces of up to so much, and maps all of a piece when one of its pages is touched."""
 
 HAS_UNNAMED_FILES: Final = sys.platform != "win32"
 

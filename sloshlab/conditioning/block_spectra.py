@@ -161,7 +161,7 @@ class _Part(NamedTuple):
 def _part(spectra: ComplexArray, line_hz: float, frequency_range_hz: tuple[float, float]) -> _Part:
     """From spectra of the reference and of the channels, shape (1 + n_names, n_blocks, n_lines)."""
     # a block with a lost sample in any channel is left out for all, so that ratios compare the same motion
-    whole = np.isfinite(spectra).all(axis=(0, 2))
+    whole = np.asarray(np.isfinite(spectra).all(axis=(0, 2)))
     spectra = spectra[:, whole]
     lines = _lines_around_maximum(spectra[0], line_hz, frequency_range_hz)
     # the same lines in all channels, those of the reference

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from numba import njit
 from numpy.lib.stride_tricks import sliding_window_view
 
-from sloshlab.out_of_core import release, release_behind
+from sloshlab.out_of_core import blocks, empty, release, release_behind
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -57,12 +57,36 @@ def widened(mask: BoolArray, n: int) -> BoolArray:
     # most masks of most runs are
     if not mask.any():
         return mask
-    wide = mask.copy()
-    for k in range(1, n // 2 + 1):
-        wide[k:] |= mask[:-k]
-    for k in range(1, n - n // 2):
-        wide[:-k] |= mask[k:]
+    wide: BoolArray = empty(mask.size, np.bool_)
+    for part in blocks(mask.size, mask, wide):
+        low, high = max(part.start - n // 2, 0), min(part.stop + n, mask.size)
+        near = mask[low:high]
+        of_part = near.copy()
+        for k in range(1, min(n // 2 + 1, near.size)):
+            of_part[k:] |= near[:-k]
+        for k in range(1, min(n - n // 2, near.size)):
+            of_part[:-k] |= near[k:]
+        wide[part] = of_part[part.start - low : part.stop - low]
     return wide
+
+
+def nowhere(n: int) -> BoolArray:
+    """Of n samples none; without memory, and not to be written to."""
+    return np.broadcast_to(np.False_, n)
+
+
+def combined(operation: np.ufunc, one: BoolArray, other: BoolArray) -> BoolArray:
+    """Two masks in one, block by block, shape (n_samples,)."""
+    result: BoolArray = empty(one.size, np.bool_)
+    for part in blocks(one.size, one, other, result):
+        operation(one[part], other[part], out=result[part])
+    return result
+
+
+def places(mask: BoolArray) -> IntArray:
+    """Where a mask is true, in ascending order."""
+    found = [part.start + np.flatnonzero(mask[part]) for part in blocks(mask.size, mask)]
+    return np.concatenate(found) if found else np.empty(0, dtype=np.int64)
 
 
 class ScannedChannel:
@@ -83,6 +107,16 @@ class ScannedChannel:
         self.n_block = max(round(NEIGHBOURHOOD_S * rate_hz), 5)
         self._n_blocks = max(values.size // self.n_block, 1)
         self._medians: dict[int, float] = {}
+
+    @property
+    def values(self) -> npt.NDArray[np.floating]:
+        """The samples as they were given, shape (n_samples,)."""
+        return self._values
+
+    @property
+    def largest(self) -> float:
+        """What they are divided by."""
+        return self._largest
 
     @property
     def size(self) -> int:

@@ -15,19 +15,22 @@ import xarray as xr
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from sloshlab.conditioning.clipping import clipped_samples, clipping
-from sloshlab.conditioning.gaps import run_bounds, sampling_step_s
-from sloshlab.conditioning.quality import LARGEST_CLIPPED_FRACTION
+from sloshlab.conditioning.gaps import sampling_step_s
+from sloshlab.conditioning.quality import LARGEST_CLIPPED_FRACTION, sample_statistics
 from sloshlab.consistency.finding import Action, BoolArray, Finding
 from sloshlab.consistency.sample_scan import (
     PREDICTION_ERROR,
     QUIETEST_STRETCH,
     SHORTEST_HOLD,
     ScannedChannel,
+    combined,
+    nowhere,
+    places,
     prediction_error,
     widened,
 )
 from sloshlab.order_statistics import median, quantile_of_sorted
-from sloshlab.out_of_core import blocks, release
+from sloshlab.out_of_core import blocks, empty, release, zeros
 from sloshlab.recording import channels
 
 FloatArray = npt.NDArray[np.float64]
@@ -61,6 +64,8 @@ SAMPLE_CHECKS: Final = {
     "repeated samples": "each value stands several times: sampled slower than stated",
 }
 """What is examined, and what a finding means."""
+_AND_NOT: Final = np.greater
+"""Of truth values: the first and not the second."""
 WHITE_GAIN: Final = float(np.sqrt((PREDICTION_ERROR**2).sum()))
 
 
@@ -100,11 +105,11 @@ def examined_samples(
             if not suspicious.any():
                 continue
             # a flat top does not change, what does not change has no noise either, and steps at both ends
-            samples = suspicious if explained is None else suspicious & ~widened(explained, 9)
-            explained = samples if explained is None else explained | samples
+            samples = suspicious if explained is None else combined(_AND_NOT, suspicious, widened(explained, 9))
+            explained = samples if explained is None else combined(np.logical_or, explained, samples)
             if check in checks and samples.any():
                 findings.append(_found(check, name, samples, time))
-                wrong[name] = wrong[name] | samples if name in wrong else samples
+                wrong[name] = combined(np.logical_or, wrong[name], samples) if name in wrong else samples
         release(recording[name].values)
     return findings, wrong
 
@@ -132,8 +137,9 @@ def _largest_finite(values: npt.NDArray[np.floating]) -> float:
 
 
 def _found(check: str, name: str, samples: BoolArray, time: FloatArray) -> Finding:
-    at = np.flatnonzero(samples)
-    text = f"{at.size} samples in {len(run_bounds(samples, True))} places: {SAMPLE_CHECKS[check]}"
+    at = places(samples)
+    n_places = 1 + int(np.count_nonzero(np.diff(at) > 1))
+    text = f"{at.size} samples in {n_places} places: {SAMPLE_CHECKS[check]}"
     # as of samples at a stated limit: few cost the cycles that they touch, many cost the run
     too_many = check == "cut off" and at.size > LARGEST_CLIPPED_FRACTION * samples.size
     action = Action.REFUSED if too_many else Action.MASKED
@@ -144,10 +150,11 @@ def _own_spikes(name: str, scanned: Mapping[str, ScannedChannel]) -> BoolArray:
     """True at spikes of a channel that are large and that no other channel feels."""
     own = scanned[name]
     spiked = spikes(own)
-    at = np.flatnonzero(spiked)
+    at = places(spiked)
     if not at.size:
         return spiked
-    smallest = _SMALLEST_SPIKE * float(np.nanstd(own.part(0, own.size)))
+    *_, deviation = sample_statistics(own.values)
+    smallest = _SMALLEST_SPIKE * deviation / own.largest
     # spikes that are near each other are looked at together
     for group in np.split(at, np.flatnonzero(np.diff(at) > own.n_block) + 1):
         first, stop = max(int(group[0]) - 2, 0), min(int(group[-1]) + 3, own.size)
@@ -166,10 +173,14 @@ def _cut_off(channel: xr.DataArray) -> BoolArray:
     found = clipping(channel)
     values = channel.values
     if not found.is_suspected:
-        return np.zeros(values.size, dtype=np.bool_)
+        return nowhere(values.size)
+    _, lowest, highest, _, _ = sample_statistics(values)
     # what the stated range explains is counted as clipped elsewhere
-    extreme = (values == np.nanmax(values)) | (values == np.nanmin(values))
-    return np.asarray(extreme & ~clipped_samples(channel))
+    clipped = clipped_samples(channel)
+    extreme: BoolArray = empty(values.size, np.bool_)
+    for part in blocks(values.size, values, clipped, extreme):
+        extreme[part] = ((values[part] == highest) | (values[part] == lowest)) & ~clipped[part]
+    return extreme
 
 
 def held_samples(channel: ScannedChannel) -> BoolArray:
@@ -181,13 +192,18 @@ def held_samples(channel: ScannedChannel) -> BoolArray:
     crest. A and ω are those of the second before and of the second after, whichever is slower; q is the smallest
     change between samples that is there.
     """
-    held = np.zeros(channel.size, dtype=np.bool_)
     bounds, n = channel.bounds, channel.n_block
+    found = []
     for start, stop in bounds.long_runs.tolist():
         sides = ((max(0, start - n), start), (stop, min(stop + n, channel.size)))
         # the side that is too slow for a hold spares the other
         if all(stop - start > _HOLD_MARGIN * _longest_hold(channel.part(*side), bounds.step) for side in sides):
-            held[start:stop] = True
+            found.append(slice(start, stop))
+    if not found:
+        return nowhere(channel.size)
+    held: BoolArray = zeros(channel.size, np.bool_)
+    for run in found:
+        held[run] = True
     return held
 
 
@@ -196,7 +212,7 @@ def repeated_samples(channel: ScannedChannel) -> BoolArray:
 
     A converter that is read faster than it converts, or a slower channel that was filled up to the common rate.
     """
-    none = np.zeros(channel.size, dtype=np.bool_)
+    none = nowhere(channel.size)
     if channel.bounds.n_repeated < _REPEATED_SHARE * channel.size:
         return none
     change = np.abs(np.diff(channel.part(0, channel.size)))
@@ -233,7 +249,7 @@ def filled_samples(channel: ScannedChannel) -> BoolArray:
     n_of_part = np.minimum(n, size - n * np.arange(bounds.loudest_power.size))
     n_below = n_of_part[_MADE_UP_SHARE**2 * bounds.loudest_power < bounds.quietest_power.min()].sum()
     if n_below > _OFTEN * size + 1:
-        return np.zeros(size, dtype=np.bool_)
+        return nowhere(size)
     error = prediction_error(channel.part(0, size))
     # NaN neither hides nor makes a stretch: it counts as noise
     power = np.where(np.isfinite(error), error**2, np.finfo(np.float64).max)
@@ -241,7 +257,7 @@ def filled_samples(channel: ScannedChannel) -> BoolArray:
     typical = float(np.median(finite))
     # the steps of a converter alone leave 0.4 of a step: only a channel with noise beyond them can lack it
     if not math.sqrt(typical) > _BEYOND_STEPS * bounds.step:
-        return np.zeros(size, dtype=np.bool_)
+        return nowhere(size)
     largest = maximum_filter1d(power, QUIETEST_STRETCH)
     # nowhere near as quiet as the channel often is: a modulated motion has calm moments of its own
     quiet: BoolArray = largest < _MADE_UP_SHARE**2 * float(np.quantile(largest, _OFTEN))
@@ -264,10 +280,13 @@ def spikes(channel: ScannedChannel) -> BoolArray:
     One wrong sample among good ones leaves the prediction errors 1, −4, 6, −4, 1 in a row; a blow that an
     anti-aliasing filter has let through is wider and leaves another pattern.
     """
-    found = np.zeros(channel.size, dtype=np.bool_)
     # the error of five predictions in a row is at most that many times the largest of them
     gain = float(np.abs(PREDICTION_ERROR).sum() / (PREDICTION_ERROR**2).sum())
-    for start, stop in channel.loud_stretches(_SPIKE_SIGMA / gain):
+    stretches = channel.loud_stretches(_SPIKE_SIGMA / gain)
+    if not stretches:
+        return nowhere(channel.size)
+    found: BoolArray = zeros(channel.size, np.bool_)
+    for start, stop in stretches:
         # the pattern is five samples wide, and the largest of five is sought
         first, last = max(start - 4, 0), min(stop + 4, channel.size)
         found[start:stop] = _fitting_the_pattern(channel.standardised(first, last))[start - first :][

@@ -164,6 +164,9 @@ def _as_stored(variable: Any) -> np.ndarray:
 def _stored_blocks(variable: Any, values: np.ndarray) -> Iterator[slice]:
     """Parts of a variable over time as it is stored; of its values only one is in memory where they are large."""
     storage = variable.chunking()
+    if isinstance(storage, list):
+        # each chunk is wanted once: kept, up to 64 MB of every channel would be
+        variable.set_var_chunk_cache(size=0, nelems=1, preemption=1.0)
     # not more at once than a file may declare as one chunk
     block = min(storage[0], len(variable)) if isinstance(storage, list) else _DECODING_BLOCK
     # whole storage chunks, or each would be decompressed twice

@@ -19,7 +19,7 @@ from scipy.fft import next_fast_len
 from scipy.interpolate import CubicSpline
 
 from sloshlab.errors import AnalysisError
-from sloshlab.out_of_core import blocks, empty, release
+from sloshlab.out_of_core import BLOCK_SAMPLES, blocks, empty, release
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -177,7 +177,7 @@ def _averaged_down(
     n_means = motion.size // factor
     mean, weight = empty(n_means, np.float64), empty(n_means, np.float64)
     n_good, total = 0, 0.0
-    for part in blocks(n_means, mean, weight):
+    for part in blocks(n_means, mean, weight, of=max(BLOCK_SAMPLES // factor, 1)):
         samples = slice(part.start * factor, part.stop * factor)
         # double precision in the sums only, so that a channel of single precision is not copied
         mean[part] = motion[samples].reshape(-1, factor).mean(axis=1, dtype=np.float64)
