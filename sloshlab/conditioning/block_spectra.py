@@ -28,7 +28,7 @@ BoolArray = npt.NDArray[np.bool_]
 # more than twice the highest frequency that is looked for
 _LOWEST_RATE_HZ = 400.0
 _BLOCK_S = 1.0
-_BLOCKS_AT_ONCE = 64
+_BLOCKS_AT_ONCE = 16
 """Whose spectra are in memory together."""
 _LINES_BESIDE = 2
 """To each side of the largest line: a Hann window spreads a sine over so many."""

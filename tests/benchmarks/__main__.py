@@ -41,12 +41,15 @@ from tests.benchmarks.twin import FREE_LABEL, LANES_LABEL, METHODS, RANDOM_LABEL
 
 ANALYSIS_LABEL = "netCDF to windows.nc and maps.nc [s]"
 READING_LABEL = "… over reading and decoding the file"
+LONG_MEMORY_LABEL = "peak memory of ten times the recording over one"
 TRANSPORTS = ("serial", "socketcand", "slcan")
 AIMS = {
     ANALYSIS_LABEL: 1.5,
     READING_LABEL: 2.0,
     "peak memory over decoded recording": 4.0,
     "10 × longer recording costs": 10.0,
+    # constant, to within what two runs of one recording differ by
+    LONG_MEMORY_LABEL: 1.1,
     CHANNELS_LABEL: 2.2,
     NETWORKS_LABEL: 2.2,
     TANKS_LABEL: 2.2,
@@ -128,6 +131,7 @@ def recording_analysis_figures() -> dict[str, float]:
         measured("make", folder)
         standard = measured("analyse", folder / "standard.nc", folder)
         memory = measured("memory", folder / "standard.nc", folder)
+        short_memory = measured("memory", folder / "chirp.nc", folder)
         long_memory = measured("memory", folder / "chirp_10.nc", folder)
         growth = measured("growth", folder / "chirp.nc", folder / "chirp_10.nc", folder)
         peer = measured("peer", folder / "standard.nc")
@@ -137,6 +141,8 @@ def recording_analysis_figures() -> dict[str, float]:
         READING_LABEL: standard["analysis_s"] / standard["read_s"],
         "peak memory over decoded recording": memory["peak_bytes"] / memory["decoded_bytes"],
         "… of ten times the recording": long_memory["peak_bytes"] / long_memory["decoded_bytes"],
+        LONG_MEMORY_LABEL: long_memory["peak_bytes"] / short_memory["peak_bytes"],
+        "peak memory of ten times the recording [MB]": long_memory["peak_bytes"] / 1e6,
         "10 × longer recording costs": growth["long_s"] / growth["short_s"],
         "reading and decoding [s]": standard["read_s"],
         "decoded recording [MB]": memory["decoded_bytes"] / 1e6,

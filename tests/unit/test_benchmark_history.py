@@ -126,4 +126,4 @@ def test_the_table_gives_a_reason_where_an_aim_is_missed_and_nowhere_else() -> N
     assert cells["10 s of beam and model 60 × 20 [s]"][2:4] == ["≤ 0.012", "not measured"]
     assert table({rival: 51.0}).count(reasons["the same, DOP853"]) == 0
     # a label that no figure has would never be filled
-    assert {row.label for row in ROWS} - set(AIMS) - set(AT_LEAST) == {"… of ten times the recording"}
+    assert {row.label for row in ROWS} <= set(AIMS) | set(AT_LEAST)

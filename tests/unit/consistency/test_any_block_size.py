@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 from shaken_tank import RATE_HZ, tank_run
 
-from pipelines.inputs.recordings import RecordingInMemory
-from pipelines.inputs.rigs import RigInMemory
 from pipelines.sweep.shaker import ShakerSettings, analyse_shaker
 from pipelines.sweep.stages import not_measured
 from sloshlab import out_of_core, returned_values
@@ -21,7 +18,6 @@ from sloshlab.conditioning.quality import quality_of, sample_statistics
 from sloshlab.consistency.examination import examined
 from sloshlab.consistency.force_response import quiet_start
 from sloshlab.recording import CLIPPED, LOST
-from sloshlab.rig import Rig
 from sloshlab.sweep import cycles, motion_phase
 
 N_OF_BLOCK = 1000
@@ -46,10 +42,17 @@ def results_of(recordings, rig):
     return analyse_shaker(recordings, [rig], settings)
 
 
-@pytest.mark.parametrize("fill", ["0.25", "0.50", "0.75"])
-def test_recordings_of_every_fill_give_the_same_in_blocks(fill, repository, monkeypatch):
+@pytest.mark.parametrize(
+    ("fill", "names"),
+    [
+        ("0.25", ["sweep_1.00g"]),
+        ("0.50", ["empty_3.00g", "frozen_3.00g", "sweep_3.00g"]),
+        ("0.75", ["sweep_6.00g"]),
+    ],
+)
+def test_recordings_of_every_fill_give_the_same_in_blocks(fill, names, repository, monkeypatch):
     folder = repository / "raw_data" / "shaker"
-    runs = [folder / f"fill_{fill}_{run}.nc" for run in ("empty_3.00g", "frozen_3.00g", "sweep_3.00g")]
+    runs = [folder / f"fill_{fill}_{run}.nc" for run in names]
     rig = next(path for path in folder.glob("*.toml") if fill in path.name)
     whole = results_of(runs, rig)
     with small_blocks(monkeypatch):
@@ -58,7 +61,7 @@ def test_recordings_of_every_fill_give_the_same_in_blocks(fill, repository, monk
     same(streamed.windows, whole.windows)
     same(streamed.maps, whole.maps)
     assert streamed.all_flags == whole.all_flags
-    assert [e.findings for e in streamed.examinations] == [e.findings for e in whole.examinations]
+    assert repr([e.findings for e in streamed.examinations]) == repr([e.findings for e in whole.examinations])
     assert [repr(run.quality) for run in streamed.runs] == [repr(run.quality) for run in whole.runs]
 
 
@@ -66,7 +69,7 @@ def same(one: xr.Dataset, other: xr.Dataset) -> None:
     assert set(one.variables) == set(other.variables)
     for name, variable in one.variables.items():
         if variable.dtype.kind == "f":
-            scale = np.nanmax(np.abs(other[name].values), initial=0.0)
+            scale = np.fmax.reduce(np.abs(other[name].values), axis=None, initial=0.0)
             np.testing.assert_allclose(variable.values, other[name].values, rtol=1e-12, atol=1e-12 * scale)
         else:
             assert (variable.values == other[name].values).all(), name
@@ -123,7 +126,7 @@ def test_damages_over_the_borders_of_blocks_are_found_as_in_the_whole(monkeypatc
     assert (streamed[2] == whole[2]).all()
     assert whole[3].any()
     assert (streamed[3] == whole[3]).all()
-    assert streamed[4].findings == whole[4].findings
+    assert repr(streamed[4].findings) == repr(whole[4].findings)
     assert streamed[4].wrong_samples.keys() == whole[4].wrong_samples.keys()
     assert all((streamed[4].wrong_samples[k] == mask).all() for k, mask in whole[4].wrong_samples.items())
     np.testing.assert_array_equal(streamed[5], whole[5])
@@ -142,7 +145,7 @@ def test_running_sums_over_blocks_are_those_of_numpy(monkeypatch):
 
 
 def test_twelve_cycles_are_counted_over_blocks(monkeypatch):
-    """A sine of 5 Hz passes a tenth of its amplitude upward for the thirteenth time twelve periods after the first."""
+    """A sine passes a tenth of its amplitude upward for the thirteenth time twelve periods after the first."""
     time = np.arange(round(20 * RATE_HZ)) / RATE_HZ
     growing = np.minimum(time / 2.0, 1.0)
     with small_blocks(monkeypatch):
@@ -151,13 +154,3 @@ def test_twelve_cycles_are_counted_over_blocks(monkeypatch):
     assert stretch is not None
     assert stretch.stop / RATE_HZ == pytest.approx(12 / 5.0, abs=0.21)
     assert stretch.stop % (RATE_HZ / 5) < 0.1 * RATE_HZ / 5
-
-
-def test_a_recording_in_memory_takes_the_same_way(monkeypatch):
-    run = tank_run(duration_s=60.0)
-    rig = RigInMemory("rig", Rig.from_toml(Path(__file__).parents[3] / "raw_data/shaker/rig_fill_0.50.toml"))
-    named = RecordingInMemory.of(run, "run")
-    whole = results_of([named], rig)
-    with small_blocks(monkeypatch):
-        streamed = results_of([named], rig)
-    same(streamed.windows, whole.windows)
