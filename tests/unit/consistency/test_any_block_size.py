@@ -45,9 +45,9 @@ def results_of(recordings, rig):
 @pytest.mark.parametrize(
     ("fill", "names"),
     [
-        ("0.25", ["sweep_1.00g"]),
+        pytest.param("0.25", ["sweep_1.00g"], marks=pytest.mark.slow),
         ("0.50", ["empty_3.00g", "frozen_3.00g", "sweep_3.00g"]),
-        ("0.75", ["sweep_6.00g"]),
+        pytest.param("0.75", ["sweep_6.00g"], marks=pytest.mark.slow),
     ],
 )
 def test_recordings_of_every_fill_give_the_same_in_blocks(fill, names, repository, monkeypatch):
