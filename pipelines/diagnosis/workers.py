@@ -189,7 +189,8 @@ def _end_with(parent: int) -> None:
 
 def _most_copies() -> int:
     """Copies of this process that may be made: each may come to need as much memory as this one has needed."""
-    if not FORKS:
+    # A process that ends with its parent, as those of a pool, may have none of its own.
+    if not FORKS or multiprocessing.current_process().daemon:
         return 0
     # not on every system
     import resource

@@ -7,6 +7,7 @@ decided elsewhere (`sloshlab.diagnosis.inference`).
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -22,7 +23,7 @@ from sloshlab.diagnosis.selection.known_fits import N_KEPT, KnownFits, largest_e
 from sloshlab.diagnosis.selection.nested_models import keys_of, own_numbers, reduced, without
 from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.missing_force.latent_force import STRUCTURE, TANK
-from sloshlab.missing_physics.candidate import Surroundings
+from sloshlab.missing_physics.candidate import Candidate, Surroundings
 
 _MOST_EFFECTS: Final = 2
 _DEVIATIONS: Final = (0.3, 0.1)
@@ -175,25 +176,39 @@ class ModelSelection:
         An effect without size would otherwise gain what is only a better optimum of what is nested in it, and the
         simpler of two forms may have been hopeless beside the other one on its way.
         """
-        for model in filter(self.known.may_win, self.known.leading(n)):
-            for effect in model.candidates:
-                place = (keys_of(model.candidates), effect.key)
-                if self._simplified_at.get(place) is model.values:
-                    continue
-                self._simplified_at[place] = model.values
-                rest = without(model, effect)
-                problem = self.known.runs.problem_of(rest)
-                start = {name: value for name, value in rest.values.items() if name in problem.names}
-                self.known.keep([at_its_optimum(problem, start)])
-                others = keys_of(rest.candidates)
-                simpler = [
-                    each
-                    for each in self.growth.pool
-                    if effect.reduces_to(each) and self.known.of_model(others | {each.key}) is None
-                ]
-                if simpler:
-                    starts = {each.key: [reduced(model, effect, each)] for each in simpler}
-                    self.growth.grown([rest], f"in the place of {effect.key}", simpler, starts)
+        models = filter(self.known.may_win, self.known.leading(n))
+        nested = [
+            (model, effect)
+            for model in models
+            for effect in model.candidates
+            if self._simplified_at.get((keys_of(model.candidates), effect.key)) is not model.values
+        ]
+        runs = self.known.runs
+
+        def fitted_without(place: tuple[FreeRunFit, Candidate]) -> FreeRunFit:
+            rest = without(*place)
+            problem = runs.problem_of(rest)
+            start = {name: value for name, value in rest.values.items() if name in problem.names}
+            return replace(at_its_optimum(problem, start), candidates=())
+
+        fits = list(runs.effort.spent_on(runs.model.executor, fitted_without, nested))
+        for (model, effect), fit in zip(nested, fits, strict=True):
+            self._simplified_at[keys_of(model.candidates), effect.key] = model.values
+            rest = without(model, effect)
+            self.known.keep([replace(fit, candidates=rest.candidates)])
+            self._simpler_form(model, effect, rest)
+
+    def _simpler_form(self, model: FreeRunFit, effect: Candidate, rest: FreeRunFit) -> None:
+        """What an effect of a model reduces to, in its place beside the rest."""
+        others = keys_of(rest.candidates)
+        simpler = [
+            each
+            for each in self.growth.pool
+            if effect.reduces_to(each) and self.known.of_model(others | {each.key}) is None
+        ]
+        if simpler:
+            starts = {each.key: [reduced(model, effect, each)] for each in simpler}
+            self.growth.grown([rest], f"in the place of {effect.key}", simpler, starts)
 
     def _refined(self, best: FreeRunFit) -> None:
         """Each effect of the best model from places about its numbers, beside its baseline and the believed one.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -69,6 +70,18 @@ def test_long_pieces_are_done_by_processes_and_what_is_within_them_in_turn() -> 
 def test_a_large_process_is_not_copied(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(workers, "_MOST_BYTES", 1024**2)
     assert set(Workers(2).map_apart(lambda _: os.getpid(), range(4))) == {os.getpid()}
+
+
+@pytest.mark.skipif(not FORKS, reason="no copies of processes here")
+def test_a_process_of_a_pool_shares_among_threads() -> None:
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        [(own, found)] = pool.map(processes_of, [4])
+    assert found == [own] * 4
+
+
+def processes_of(n: int) -> tuple[int, list[int]]:
+    """This process, and those that did so many pieces for it."""
+    return os.getpid(), list(Workers(2).map_apart(lambda _: os.getpid(), range(n)))
 
 
 def test_an_error_in_a_process_is_raised() -> None:
