@@ -26,7 +26,7 @@ N_KEPT: Final = 4
 """Models that are fitted to the end at every step of the search; eight times as many are begun, half of them where
 one is known that explains as much, so that the others are only compared with it."""
 _BUDGET: Final = 6e8
-"""Readings that may be simulated, two minutes on two cores; what is begun is finished, no more is begun."""
+"""Readings that may be simulated, up to five minutes on two cores; what is begun is finished, no more is begun."""
 LEAST_EXPLAINED: Final = 0.1
 """Of what is left beyond noise, that a force explains if a fit is to start from there, and the last effect of the
 best model if the search is to add others.
