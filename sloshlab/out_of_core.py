@@ -141,9 +141,12 @@ def release(array: npt.NDArray[Any]) -> None:
         Also part of a larger one; nothing is done if it lies in memory.
     """
     mapping = _mapping(array)
-    if mapping is None or not hasattr(mapping, "madvise"):
+    if mapping is None or not array.size or not hasattr(mapping, "madvise"):
         return
-    low, high = np.lib.array_utils.byte_bounds(array)
+    ends = [(n - 1) * stride for n, stride in zip(array.shape, array.strides, strict=True)]
+    address = array.__array_interface__["data"][0]
+    low = address + sum(min(end, 0) for end in ends)
+    high = address + sum(max(end, 0) for end in ends) + array.itemsize
     begins = np.frombuffer(mapping, np.uint8).__array_interface__["data"][0]
     # whole pages, those of the neighbours with them: the system brings them together, and they come back
     first = max((low - begins) // _TOGETHER_BYTES - 1, 0) * _TOGETHER_BYTES
