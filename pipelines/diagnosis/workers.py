@@ -130,21 +130,19 @@ class _Copies:
                 busy.add(end)
                 end.send(i)
 
-        def take(end: Connection) -> None:
-            i, error, found[i] = end.recv()
-            if error is not None:
-                raise error
-
         for end in self._processes:
             give(end)
         for expected in range(n_pieces):
             while expected not in found:
                 for end in cast(list[Connection], wait(busy)):
                     try:
-                        take(end)
+                        i, error, result = end.recv()
                         give(end)
                     except (EOFError, BrokenPipeError, ConnectionResetError):
                         raise self._ended(end) from None
+                    if error is not None:
+                        raise error
+                    found[i] = result
             yield found.pop(expected)
 
     def _ended(self, end: Connection) -> AnalysisError:

@@ -244,8 +244,9 @@ def sweep_signals(recording: xr.Dataset, rig: Rig, dry: DryMass | None, quality:
     force = total_force(recording).values
     # by g before anything else, so that force and acceleration are on one scale; in place and in its own type,
     # because long recordings cost memory traffic
-    for part in blocks(force.size if gain != 1.0 else 0, force):
-        force[part] /= gain
+    if gain != 1.0:
+        for part in blocks(force.size, force):
+            force[part] /= gain
     return SweepSignals(
         force_n=force,
         motion=mean_acceleration(recording).values,

@@ -17,7 +17,7 @@ SEED = 1
 
 
 def diagnosis_figures(folder: Path) -> dict[str, float]:
-    """Draw the cases and diagnose each in a process of its own, with two threads; seconds by the clock."""
+    """Draw the cases and diagnose each in a process of its own, on two cores; seconds by the clock."""
     trial = folder / "trial"
     seal(trial, seed=SEED, n_cases=N_CASES, key=None)
     outcomes = run_trial(trial, n_workers=1, time_limit_s=900.0)

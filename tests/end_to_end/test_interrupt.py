@@ -91,29 +91,14 @@ def test_interrupt_leaves_earlier_results_alone(laboratory: Path, tmp_path: Path
     assert leftovers(tmp_path) == []
 
 
-MOMENTS_S = (0.9, 1.4, 2.2, 3.0, 4.5)
-
-
-@pytest.mark.parametrize(
-    ("signal_name", "moments_s"),
-    [
-        pytest.param("SIGINT", MOMENTS_S, id="SIGINT"),
-        # what is done at a signal is the same for all three, tests/unit/test_held_interrupt.py
-        pytest.param("SIGTERM", MOMENTS_S[1:4], id="SIGTERM"),
-        pytest.param("SIGHUP", MOMENTS_S[1:4], id="SIGHUP"),
-        pytest.param("SIGTERM", MOMENTS_S, id="SIGTERM-at-all", marks=pytest.mark.slow),
-        pytest.param("SIGHUP", MOMENTS_S, id="SIGHUP-at-all", marks=pytest.mark.slow),
-    ],
-)
-def test_signals_at_many_moments(
-    signal_name: str, moments_s: tuple[float, ...], laboratory: Path, tmp_path: Path
-) -> None:
+@pytest.mark.parametrize("signal_name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_signals_at_many_moments(signal_name: str, laboratory: Path, tmp_path: Path) -> None:
     """Wherever the signal falls, the folder is complete or absent; no moment is assumed to be in any stage."""
     command = [str(Path(sys.executable).with_name("sloshlab"))]
     complete = {"windows.nc", "maps.nc", "report.html"}
     sent, codes = signal.Signals[signal_name], []
     said = "interrupted" if sent == signal.SIGINT else f"ended by {signal_name}"
-    for number, delay_s in enumerate(moments_s):
+    for number, delay_s in enumerate((0.9, 1.4, 2.2, 3.0, 4.5)):
         folder = tmp_path / str(number)
         folder.mkdir()
         process = subprocess.Popen(

@@ -95,6 +95,15 @@ def _refused(n: int) -> int:
     return n
 
 
+@pytest.mark.parametrize("error", [EOFError, BrokenPipeError], ids=["end of a file", "broken pipe"])
+def test_an_error_of_the_work_is_none_of_the_pipe(error: type[Exception]) -> None:
+    def piece(n: int) -> int:
+        raise error(f"of piece {n}")
+
+    with pytest.raises(error, match="of piece"):
+        list(Workers(2).map_apart(piece, range(4)))
+
+
 @pytest.mark.skipif(not FORKS, reason="no copies of processes here")
 def test_an_error_ends_the_pieces_that_others_are_at(tmp_path: Path) -> None:
     """One fails at once, the other would take a minute: nobody waits for it, and it does not go on."""
