@@ -34,8 +34,13 @@ def inlined(function: _F) -> _F:
     return njit(**_WITHIN, forceinline=True)(function)  # type: ignore[no-any-return]
 
 
+def pasted(function: _F) -> _F:
+    """Put into the one function that calls it, before anything is compiled: it is compiled but once."""
+    return njit(**_WITHIN, inline="always")(function)  # type: ignore[no-any-return]
+
+
 def address_of(function: Callable[..., Any], *arguments: Any) -> int:
-    """Where a `called` or `inlined` function is that was compiled for the types of these arguments."""
+    """Where a compiled function is that was compiled for the types of these arguments."""
     key = (function, *map(_form_of, arguments))
     if key not in _addresses:
         given = tuple(typeof(argument) for argument in arguments)

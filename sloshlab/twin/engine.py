@@ -18,10 +18,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sloshlab.twin.compiled import called, entry, inlined
+from sloshlab.twin.compiled import called, entry, inlined, pasted
+from sloshlab.twin.lane_vector import table_at
 from sloshlab.twin.law import N_MOTION, VELOCITY
 from sloshlab.twin.law_call import call_law
-from sloshlab.twin.model import NO_FRICTION, STICKS, Excited, FloatArray, Model, Outputs, Scratch, Stretch, Time
+from sloshlab.twin.model import (
+    ABSOLUTE,
+    NO_FRICTION,
+    STICKS,
+    Excited,
+    FloatArray,
+    Model,
+    Outputs,
+    Scratch,
+    Stretch,
+    Time,
+)
 from sloshlab.twin.rates import advance, advance_by_call, rates_by_call, release_friction, set_friction
 from sloshlab.twin.status import Status
 
@@ -152,6 +164,9 @@ def _log(out: Outputs, now: Time, term: int, event: int, value: float) -> None:
 @inlined
 def _record(m: Model, row: int, s: Scratch, out: Outputs) -> None:
     """The present state as a row of the outputs; the rates there are in the first slopes."""
+    if out.series:
+        record_series(m, row, s, out)
+        return
     n, y = m.stiffness.size, s.state
     forces = n + y.size
     works = forces + s.force.size
@@ -165,6 +180,21 @@ def _record(m: Model, row: int, s: Scratch, out: Outputs) -> None:
         out.rows[row, forces + i] = s.force[i]
     for j in range(s.works.size):
         out.rows[row, works + j] = s.works[j]
+
+
+@called
+def record_series(m: Model, row: int, s: Scratch, out: Outputs) -> None:
+    """The same in a table with time along its rows: modes and the sum of the forces on the tank."""
+    n, force = m.stiffness.size, 0.0
+    table = table_at(out.series, 3 * n + 1, out.n_series)
+    for j in range(2 * n):
+        table[j, row] = s.state[j]
+    for j in range(n):
+        table[2 * n + j, row] = s.slopes[0, n + j]
+    for i in range(m.law.size):
+        if m.frame[i] == ABSOLUTE:
+            force += s.force[i]
+    table[3 * n, row] = force
 
 
 @inlined
@@ -237,7 +267,7 @@ def _update_due(m: Model, excited: Excited, now: Time, tolerance_s: float, s: Sc
 
 
 @called
-def next_update(m: Model, s: Scratch) -> float:
+def _next_update(m: Model, s: Scratch) -> float:
     """When [s] a model in discrete time takes its next step; infinite without any."""
     due = np.inf
     for i in range(m.law.size):
@@ -246,8 +276,8 @@ def next_update(m: Model, s: Scratch) -> float:
     return due
 
 
-@inlined
-def take_step(
+@pasted
+def _take_step(
     m: Model, excited: Excited, s: Scratch, stretch: Stretch, out: Outputs, index: int, due: float
 ) -> tuple[int, int, float]:
     """One step with all its events; status, what ended the simulation, and when the next update is due."""
@@ -274,7 +304,7 @@ def take_step(
             now = Time((index + done) * step, 2.0 * (index + done))
             if due <= now.seconds + _SHARE_TOLERANCE * step:
                 _update_due(m, excited, now, _SHARE_TOLERANCE * step, s)
-                due = next_update(m, s)
+                due = _next_update(m, s)
             continue
         # The rest of the step starts anew from the event, with the switches turned: no stage looks across it.
         done += _to_event(m, excited, now, _PastEvent(step, share, gap), s)
@@ -291,8 +321,8 @@ def take_step(
     return DONE, -1, due
 
 
-@inlined
-def end_row(m: Model, excited: Excited, s: Scratch, stretch: Stretch, row: int) -> int:
+@pasted
+def _end_row(m: Model, excited: Excited, s: Scratch, stretch: Stretch, row: int) -> int:
     """Updates of models that follow the output; the state that is beyond its bound after them, or −1."""
     if m.updates:
         n = row * stretch.n_substeps
@@ -302,23 +332,26 @@ def end_row(m: Model, excited: Excited, s: Scratch, stretch: Stretch, row: int) 
 
 @entry
 def integrate(m: Model, excited: Excited, s: Scratch, stretch: Stretch, out: Outputs) -> tuple[int, int, int]:
-    """Integrate on and fill the rows of a stretch.
+    """Integrate on and fill the rows of a stretch; where nothing is kept, these are steps, not rows, of a run.
 
     Returns
     -------
     tuple of int
         Status, rows filled, term or state that ended the simulation.
     """
-    if stretch.first_row == 1:
+    keeps = out.series != 0 or out.rows.size > 0
+    if keeps and stretch.first_row == 1:
         _record(m, 0, s, out)
-    due = next_update(m, s)
+    due = _next_update(m, s)
     for row in range(stretch.first_row, stretch.last_row):
         for substep in range(stretch.n_substeps):
             index = (row - 1) * stretch.n_substeps + substep
-            status, where, due = take_step(m, excited, s, stretch, out, index, due)
+            status, where, due = _take_step(m, excited, s, stretch, out, index, due)
             if status != DONE:
                 return status, row, where
-        where = end_row(m, excited, s, stretch, row)
+        if not keeps:
+            continue
+        where = _end_row(m, excited, s, stretch, row)
         if where >= 0:
             return UNSTABLE, row, where
         _record(m, row, s, out)

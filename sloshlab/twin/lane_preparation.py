@@ -219,24 +219,24 @@ class _Pack:
         series = engine.Series(_addresses(own), n_rows)
         side_by_side, scratches = self._side_by_side(), self._scratch()
         status, filled, where = (np.full(N_LANES, value) for value in (int(Status.DONE), n_rows, -1))
-        out = Outputs(np.empty((0, 0)), np.empty((0, 4)), np.zeros(1, np.int64))
-        alone, unsolved = np.zeros(N_LANES, np.int64), np.zeros(N_LANES, np.int64)
-        ends = engine.LaneEnds(status, filled, where, alone, unsolved, out)
+        out = Outputs(np.empty((0, 0)), np.empty((0, 4)), np.zeros(1, np.int64), 0, 0)
+        stepped_alone, unsolved = np.zeros(N_LANES, np.int64), np.zeros(N_LANES, np.int64)
+        ends = engine.LaneEnds(status, filled, where, stepped_alone, unsolved, out)
         largest = bounds_of_states(self.n_modes, self.n_memory)
         step = 1.0 / (self.excitation.sampling_rate_hz * self.n_substeps)
         inputs = _Inputs(self.lanes)
         for first_row, last_row in stretches(n_rows, self.n_substeps):
             tables, drives = inputs.of(first_row, last_row, self.factors)
-            if first_row == 1:
-                engine.begin_lanes(self.twins, drives, side_by_side, scratches, ends, series)
             stretch = Stretch(first_row, last_row, self.n_substeps, step, largest)
+            alone = engine.addresses_for(self.twins, drives, scratches, stretch, ends)
+            if first_row == 1:
+                engine.begin_lanes(self.twins, drives, side_by_side, scratches, ends, series, alone.begin)
             if self.steps_together:
-                by_itself = engine.address_of_step(self.twins, drives, scratches, stretch, ends)
                 engine.integrate_together(
-                    self.twins, drives, side_by_side, scratches, stretch, ends, series, by_itself
+                    self.twins, drives, side_by_side, scratches, stretch, ends, series, alone.integrate
                 )
             else:
-                engine.integrate_in_turn(self.twins, drives, scratches, stretch, ends, series)
+                engine.integrate_in_turn(self.twins, drives, scratches, stretch, ends, series, alone.integrate)
             del tables  # kept up to here, as the loop has only their addresses
         return [self._motion(i, own[i], ends, inputs) for i in range(len(self.lanes))]
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sloshlab.twin.compiled import address_of, called, entry, inlined
-from sloshlab.twin.engine import DONE, FAULT, SWITCH_TOLERANCE, UNSTABLE, begin, end_row, next_update, take_step
+from sloshlab.twin.engine import DONE, FAULT, SWITCH_TOLERANCE, UNSTABLE, begin, integrate, record_series
 from sloshlab.twin.lane_vector import N_LANES, alike, call_law_together, numbers_of, put, table_at
 from sloshlab.twin.law import (
     ACCELERATION,
@@ -27,7 +27,7 @@ from sloshlab.twin.law import (
     TIME,
     VELOCITY,
 )
-from sloshlab.twin.law_call import call_law, call_step
+from sloshlab.twin.law_call import call_begin, call_integrate, call_law
 from sloshlab.twin.model import (
     ABSOLUTE,
     DRY_FRICTION,
@@ -171,12 +171,19 @@ def _excited(drives: Drives, lane: int) -> Excited:
     return Excited(table, drives.first, drives.factor[lane])
 
 
-def address_of_step(lanes: Lanes, drives: Drives, s: LaneScratch, stretch: Stretch, ends: LaneEnds) -> int:
-    """Where `take_step` is for lanes like these, for `integrate_together`."""
+class Addresses(NamedTuple):
+    """Where the engine for one twin is."""
+
+    begin: int
+    integrate: int
+
+
+def addresses_for(lanes: Lanes, drives: Drives, s: LaneScratch, stretch: Stretch, ends: LaneEnds) -> Addresses:
+    """Where the engine for one twin is, compiled for lanes like these."""
     excited = Excited(np.empty((0, _N_INPUTS)), drives.first, drives.factor[0])
     # what compiled code makes of a lane, so that the types are the same there
     m, own = _model.py_func(lanes, 0), _scratch.py_func(s, 0)  # type: ignore[attr-defined]
-    return address_of(take_step, m, excited, own, stretch, ends.out, 0, np.inf)
+    return Addresses(address_of(begin, m, excited, own), address_of(integrate, m, excited, own, stretch, ends.out))
 
 
 @inlined
@@ -473,22 +480,17 @@ def _stop(lane: int, status: int, filled: int, where: int, ends: LaneEnds) -> No
 
 
 @inlined
-def _record_alone(lanes: Lanes, lane: int, row: int, s: LaneScratch, series: Series) -> None:
-    n = lanes.n_modes
-    of_lane = table_at(series.tables[lane], 3 * n + 1, series.n_rows)
-    for j in range(2 * n):
-        of_lane[j, row] = s.state[lane, j]
-    for j in range(n):
-        of_lane[2 * n + j, row] = s.slopes[lane, 0, n + j]
-    of_lane[3 * n, row] = _tank_force(lanes, s.force[lane], 0, 1)
+def _outputs(series: Series, lane: int, ends: LaneEnds) -> Outputs:
+    of = ends.out
+    return Outputs(of.rows, of.log, of.n_events, series.tables[lane], series.n_rows)
 
 
 @inlined
-def _tank_force(lanes: Lanes, forces: FloatArray, first: int, step: int) -> float:
+def _tank_force(lanes: Lanes, forces: FloatArray, lane: int) -> float:
     total = 0.0
     for i in range(lanes.of_first.law.size):
         if lanes.of_first.frame[i] == ABSOLUTE:
-            total += forces[first + i * step]
+            total += forces[lane + i * N_LANES]
     return total
 
 
@@ -521,7 +523,7 @@ def _end_row(
             of_lane[j, row] = b.state[j * N_LANES + lane]
         for j in range(n):
             of_lane[2 * n + j, row] = b.slopes[(n + j) * N_LANES + lane]
-        of_lane[3 * n, row] = _tank_force(lanes, b.force, lane, N_LANES)
+        of_lane[3 * n, row] = _tank_force(lanes, b.force, lane)
 
 
 @entry
@@ -533,9 +535,9 @@ def integrate_together(
     stretch: Stretch,
     ends: LaneEnds,
     series: Series,
-    step_alone: int,
+    alone: int,
 ) -> None:
-    """Integrate all lanes on, and fill their rows of a stretch; `step_alone` is the address of `take_step`."""
+    """Integrate all lanes on, and fill their rows of a stretch; `alone` is the address of `integrate`."""
     cares = lanes.of_first.friction_frame >= 0 or lanes.of_first.uses_acceleration
     for i in range(lanes.of_first.law.size):
         cares |= lanes.of_first.events[i] != 0
@@ -548,58 +550,48 @@ def integrate_together(
             _advance(lanes, drives, (index, stretch.step_s), b, s, ends)
             if cares:
                 for lane in range(lanes.n_used):
-                    alone = ends.status[lane] == DONE and (ends.unsolved[lane] or _has_event(lanes, lane, b, s))
-                    if alone:
+                    steps_alone = ends.status[lane] == DONE and (
+                        ends.unsolved[lane] or _has_event(lanes, lane, b, s)
+                    )
+                    if steps_alone:
                         s.slope[lane, 0] = s.slope_before[lane]
                         _take_out(lanes, lane, b, s)
                         m, excited, own = _model(lanes, lane), _excited(drives, lane), _scratch(s, lane)
-                        status, where, _ = call_step(
-                            step_alone, (m, excited, own, stretch, ends.out, index, np.inf)
-                        )
+                        step = Stretch(index + 1, index + 2, 1, stretch.step_s, stretch.largest)
+                        status, _, where = call_integrate(alone, (m, excited, own, step, ends.out))
                         _put_in(lanes, lane, b, s)
                         if status != DONE:
                             _stop(lane, status, row, where, ends)
-                    ends.alone[lane] = alone
+                    ends.alone[lane] = steps_alone
             _accept(lanes, b, s, ends)
         _end_row(lanes, row, stretch, b, s, ends, series)
 
 
 @entry
 def begin_lanes(
-    lanes: Lanes, drives: Drives, b: SideBySide, s: LaneScratch, ends: LaneEnds, series: Series
+    lanes: Lanes, drives: Drives, b: SideBySide, s: LaneScratch, ends: LaneEnds, series: Series, alone: int
 ) -> None:
-    """Set switches and friction of every lane, and record its start."""
+    """Set switches and friction of every lane, and record its start; `alone` is the address of `begin`."""
     for lane in range(lanes.n_used):
-        where = begin(_model(lanes, lane), _excited(drives, lane), _scratch(s, lane))
+        m, own = _model(lanes, lane), _scratch(s, lane)
+        where = call_begin(alone, (m, _excited(drives, lane), own))
         if where >= 0:
             _stop(lane, FAULT, 0, where, ends)
             continue
-        _record_alone(lanes, lane, 0, s, series)
+        record_series(m, 0, own, _outputs(series, lane, ends))
         for j in range(2 * lanes.n_modes):
             b.state[j * N_LANES + lane], b.slopes[j * N_LANES + lane] = s.state[lane, j], s.slopes[lane, 0, j]
 
 
 @entry
 def integrate_in_turn(
-    lanes: Lanes, drives: Drives, s: LaneScratch, stretch: Stretch, ends: LaneEnds, series: Series
+    lanes: Lanes, drives: Drives, s: LaneScratch, stretch: Stretch, ends: LaneEnds, series: Series, alone: int
 ) -> None:
     """The same, one lane after the other."""
     for lane in range(lanes.n_used):
         if ends.status[lane] != DONE:
             continue
         m, excited, own = _model(lanes, lane), _excited(drives, lane), _scratch(s, lane)
-        due = next_update(m, own)
-        for row in range(stretch.first_row, stretch.last_row):
-            status, where = DONE, -1
-            for substep in range(stretch.n_substeps):
-                index = (row - 1) * stretch.n_substeps + substep
-                status, where, due = take_step(m, excited, own, stretch, ends.out, index, due)
-                if status != DONE:
-                    break
-            if status == DONE:
-                where = end_row(m, excited, own, stretch, row)
-                status = UNSTABLE if where >= 0 else DONE
-            if status != DONE:
-                _stop(lane, status, row, where, ends)
-                break
-            _record_alone(lanes, lane, row, s, series)
+        status, row, where = call_integrate(alone, (m, excited, own, stretch, _outputs(series, lane, ends)))
+        if status != DONE:
+            _stop(lane, status, row, where, ends)

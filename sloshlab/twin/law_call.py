@@ -1,4 +1,4 @@
-"""Calling by address from compiled code: laws, and a step that is not compiled again where it is hardly taken."""
+"""Calling by address from compiled code: laws, and the engine, so that no caller compiles it again."""
 
 from __future__ import annotations
 
@@ -30,10 +30,20 @@ def call_law(typing: Any, address: Any, arrays: Any, offsets: Any) -> Any:
 
 
 @intrinsic  # type: ignore[untyped-decorator]
-def call_step(typing: Any, address: Any, arguments: Any) -> Any:
-    """Call `take_step`, compiled for the types of these arguments, at its `address`; see `address_of`."""
+def call_begin(typing: Any, address: Any, arguments: Any) -> Any:
+    """Call `begin`, compiled for the types of these arguments, at its `address`; see `address_of`."""
+    return _calling(types.int64, arguments)
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def call_integrate(typing: Any, address: Any, arguments: Any) -> Any:
+    """Call `integrate`, likewise."""
+    return _calling(types.UniTuple(types.int64, 3), arguments)
+
+
+def _calling(returned: Any, arguments: Any) -> Any:
     # numba optimises what a loop calls once more within the loop, even what it hardly ever calls
-    given, returned = tuple(arguments), types.Tuple((types.int64, types.int64, types.float64))
+    given = tuple(arguments)
 
     def code(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         convention = context.call_conv

@@ -129,11 +129,14 @@ class Outputs(NamedTuple):
     """What is kept; motions of the places are not, because they follow from those of modes and base.
 
     One table, since fresh memory is touched for the first time here and a large block of it costs least.
+    Without rows and series nothing is.
     """
 
     rows: FloatArray  # (n, 3 n_modes + n_memory + n_terms + n_works): q, q̇, q̈, memory, forces, works at a sample
     log: FloatArray  # (largest number of events kept, 4)
     n_events: IntArray  # (1,) of all events so far, more than are kept if need be
+    series: int  # address of a table (3 n_modes + 1, n_series): q, q̇, q̈, force on the tank over time; 0: rows
+    n_series: int
 
 
 class Stretch(NamedTuple):

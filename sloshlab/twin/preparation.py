@@ -233,7 +233,7 @@ def run(
     )
     n_kept = n_columns(model.stiffness.size, model.law.size, n_memory)
     _check_size(n_rows, n_kept)
-    out = Outputs(np.empty((n_rows, n_kept)), np.empty((_LARGEST_EVENT_LOG, 4)), np.zeros(1, np.int64))
+    out = Outputs(np.empty((n_rows, n_kept)), np.empty((_LARGEST_EVENT_LOG, 4)), np.zeros(1, np.int64), 0, 0)
     inputs = _KeptInputs(np.zeros(n_rows), np.zeros((n_rows, 3)))
     step = 1.0 / (excitation.sampling_rate_hz * n_substeps)
     status, filled, where = int(Status.DONE), 1, -1

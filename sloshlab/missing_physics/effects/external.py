@@ -113,7 +113,7 @@ def _pulses_in(*, alternate: bool) -> Callable[[Surroundings, MissingForces], li
             # force along the shape of a pulse that begins at each place, of which eight are within a width
             apart = max(1, n // _PLACES_PER_WIDTH)
             along = {
-                run: (np.correlate(force, shape, "valid") / (shape @ shape))[::apart]
+                run: np.ascontiguousarray((np.correlate(force, shape, "valid") / (shape @ shape))[::apart])
                 for run, force in missing.items()
             }
             periods = _periods(n / apart, longest / apart)
@@ -176,8 +176,8 @@ def _best_places(values: FloatArray, periods: FloatArray, alternate: bool) -> Fl
         n_longer = max(min(n_places, values.size - int(np.rint(n_pulses * period))), 0)
         # A train that explains nothing has its first pulse, too: its weight must not be zero.
         best[i, :, 2] = n_pulses + (n_longer > 0)
-        _keep_extremes(best[i], sums, values, (0, n_longer), n_pulses + 1.0, period, alternate)
-        _keep_extremes(best[i], sums, values, (n_longer, n_places), float(n_pulses), period, alternate)
+        _keep_extremes(best[i], sums, values, 0, n_longer, n_pulses + 1.0, period, alternate)
+        _keep_extremes(best[i], sums, values, n_longer, n_places, float(n_pulses), period, alternate)
     return best
 
 
@@ -186,16 +186,16 @@ def _keep_extremes(
     best: FloatArray,
     sums: FloatArray,
     values: FloatArray,
-    places: tuple[int, int],
+    first: int,
+    end: int,
     count: float,
     period: float,
     alternate: bool,
 ) -> None:
-    """Better trains among those that begin from one place to another, all of so many pulses; into `best`.
+    """Better trains among those that begin from `first` to before `end`, all of so many pulses; into `best`.
 
     Of trains of one number of pulses the largest sum and the least one explain most.
     """
-    first, end = places
     if first >= end:
         return
     high = low = high_later = low_later = first
