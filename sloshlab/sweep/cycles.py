@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,7 @@ _CYCLES_AT_ONCE = 512
 """About a minute; their samples are in memory together."""
 _WORK, _MEAN, _SQUARE, _HIGHEST, _LOWEST = 0, 1, 2, 3, 4
 _N_SCALARS = 5
+_fast: Final = njit(cache=True, nogil=True, fastmath={"contract", "nsz", "arcp"})
 
 
 @dataclass(frozen=True)
@@ -254,8 +255,39 @@ def _complete(signals: _Signals, start: float, stop: float) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "nsz", "arcp"})  # type: ignore[untyped-decorator]
-def _evaluate_cycle(signals: _Signals, cycle: _Cycle, scalars: FloatArray, phasors: ComplexArray) -> None:
+class _Integrals(NamedTuple):
+    """Integrals over the time of a cycle; phasors over its phase, times half the duration."""
+
+    work: float  # of F v
+    force: float
+    force_time: float  # of F t, t from the middle of the cycle
+    velocity: float
+    motion: float
+    left: float  # of d
+    left_square: float
+    highest: float  # of d
+    lowest: float
+    velocity_1: complex  # of v at Ω
+    time_1: complex  # of t at Ω
+    half_1: complex  # of d at Ω/2
+    half_3: complex  # of d at 3Ω/2
+
+
+@_fast  # type: ignore[untyped-decorator]
+def _phase(x: float, c_start: float, c_stop: float) -> tuple[float, float]:
+    """φ/2π and its slope where a share x of a cycle has gone by.
+
+    The cubic x + x (1-x) (c₀ (1-x) - c₁ x) with the measured slopes at both ends: continuous with the neighbouring
+    cycles in value and slope, as Ω changes within the cycle.
+    """
+    bend = c_start * (1.0 - x) - c_stop * x
+    turn = x + x * (1.0 - x) * bend
+    return turn, 1.0 + (1.0 - 2.0 * x) * bend - x * (1.0 - x) * (c_start + c_stop)
+
+
+@_fast  # type: ignore[untyped-decorator]
+def _integrals(signals: _Signals, cycle: _Cycle, force_k: ComplexArray, motion_k: ComplexArray) -> _Integrals:
+    """All integrals; those of force and motion at Ω … 5Ω are added to the two arrays."""
     # The flags of fastmath leave out "ninf", because `highest` and `lowest` start at infinity. Arrays leave the
     # tuple before the loop, in which counting their references would cost time.
     force, motion, motion_is_velocity = signals.force, signals.motion, signals.motion_is_velocity
@@ -268,16 +300,12 @@ def _evaluate_cycle(signals: _Signals, cycle: _Cycle, scalars: FloatArray, phaso
     left, right = np.empty(6), np.empty(6)
     boundary_weights(p - start, left)
     boundary_weights(stop - q, right)
-    # φ/2π of the cycle as the cubic x + x (1-x) (c₀ (1-x) - c₁ x) with the measured slopes at both ends
-    # (continuous with the neighbouring cycles in value and slope: Ω changes within the cycle)
     c_start, c_stop = cycle.slope_start - 1.0, cycle.slope_stop - 1.0
     work = sum_force = sum_force_time = sum_velocity = sum_motion = 0.0
     sum_d = sum_d2 = 0.0
     highest, lowest = -np.inf, np.inf
     velocity_1 = time_1 = 0.0 + 0.0j
     half_1 = half_3 = 0.0 + 0.0j
-    force_k = np.zeros(N_HARMONICS, dtype=np.complex128)
-    motion_k = np.zeros(N_HARMONICS, dtype=np.complex128)
     # any start will do: the mean of the velocity is taken out of every sum below
     velocity = 0.0
     # three samples beyond the cycle to each side, for the weights of the boundaries
@@ -289,8 +317,7 @@ def _evaluate_cycle(signals: _Signals, cycle: _Cycle, scalars: FloatArray, phaso
         if i >= q - 2:
             weight += right[q + 3 - i]
         x = (i - start) / length
-        turn = x + x * (1.0 - x) * (c_start * (1.0 - x) - c_stop * x)
-        rate = 1.0 + (1.0 - 2.0 * x) * (c_start * (1.0 - x) - c_stop * x) - x * (1.0 - x) * (c_start + c_stop)
+        turn, rate = _phase(x, c_start, c_stop)
         # One sine and one cosine per sample: e^{−jφ} is the square of e^{−jφ/2}, and the harmonics are its
         # powers.
         half_angle = np.pi * turn
@@ -335,29 +362,42 @@ def _evaluate_cycle(signals: _Signals, cycle: _Cycle, scalars: FloatArray, phaso
         # samples beyond the boundaries count in the quadrature, but belong to the neighbouring cycles
         if p <= i <= q:
             highest, lowest = max(highest, d), min(lowest, d)
+    return _Integrals(
+        work, sum_force, sum_force_time, sum_velocity, sum_motion, sum_d, sum_d2, highest, lowest,
+        velocity_1, time_1, half_1, half_3,
+    )  # fmt: skip
+
+
+@_fast  # type: ignore[untyped-decorator]
+def _evaluate_cycle(signals: _Signals, cycle: _Cycle, scalars: FloatArray, phasors: ComplexArray) -> None:
+    """Scalars and phasors of a cycle."""
+    force_k = np.zeros(N_HARMONICS, dtype=np.complex128)
+    motion_k = np.zeros(N_HARMONICS, dtype=np.complex128)
+    of = _integrals(signals, cycle, force_k, motion_k)
+    duration = (cycle.stop - cycle.start) * signals.step_s
     two_per_duration = 2.0 / duration
     # both constants of integration are corrected in the sums, so that the samples are gone through once
     # An accelerometer's offset makes the velocity run away; over a cycle of steady motion ü has no mean.
-    drift = 0.0 if motion_is_velocity else sum_motion / duration
-    mean_velocity = sum_velocity / duration
+    drift = 0.0 if signals.motion_is_velocity else of.motion / duration
+    mean_velocity = of.velocity / duration
     # ∮ F (v − v̄ − drift·t) dt by linearity. Static weight in F drops out too, as the corrected velocity has no
     # mean.
-    scalars[_WORK] = work - mean_velocity * sum_force - drift * sum_force_time
-    scalars[_MEAN] = sum_d / duration
-    scalars[_SQUARE] = sum_d2 / duration
-    scalars[_HIGHEST], scalars[_LOWEST] = highest, lowest
+    scalars[_WORK] = of.work - mean_velocity * of.force - drift * of.force_time
+    scalars[_MEAN] = of.left / duration
+    scalars[_SQUARE] = of.left_square / duration
+    scalars[_HIGHEST], scalars[_LOWEST] = of.highest, of.lowest
     # the mean of the velocity needs no correction here: a constant has no part at Ω
-    velocity_1 = two_per_duration * (velocity_1 - drift * time_1)
+    velocity_1 = two_per_duration * (of.velocity_1 - drift * of.time_1)
     omega = 2.0 * np.pi / duration
     for k in range(N_HARMONICS):
         phasors[k] = two_per_duration * force_k[k]
         # e^{+jΩt}: a derivative is a factor jkΩ
-        factor = 1j * omega * (k + 1) if motion_is_velocity else 1.0 + 0.0j
+        factor = 1j * omega * (k + 1) if signals.motion_is_velocity else 1.0 + 0.0j
         phasors[N_HARMONICS + k] = two_per_duration * motion_k[k] * factor
     phasors[2 * N_HARMONICS] = velocity_1
     # half a turn of Ω/2 passes in a cycle: what alternates has the other sign in every second one
     # The constant and the harmonics have the other sign in every second cycle then; only means over pairs are
     # free of them.
     sign = 1.0 - 2.0 * cycle.parity
-    phasors[2 * N_HARMONICS + 1] = sign * two_per_duration * half_1
-    phasors[2 * N_HARMONICS + 2] = sign * two_per_duration * half_3
+    phasors[2 * N_HARMONICS + 1] = sign * two_per_duration * of.half_1
+    phasors[2 * N_HARMONICS + 2] = sign * two_per_duration * of.half_3
