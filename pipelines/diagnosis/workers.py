@@ -15,8 +15,9 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from multiprocessing.connection import Connection, wait
-from multiprocessing.context import ForkProcess
+from multiprocessing.context import ForkContext, ForkProcess
 from typing import Any, Final, TypeVar, cast
 
 from sloshlab.errors import AnalysisError
@@ -86,7 +87,7 @@ class Workers:
 
         copies = _Copies(n_processes, piece)
         try:
-            yield from copies.results(len(work))
+            yield from copies.results(len(work)) if copies.n else map(function, work)
         finally:
             copies.end()
 
@@ -95,21 +96,36 @@ class _Copies:
     """Processes that begin as copies of this one, each at the other end of a pipe of its own.
 
     With queues in common one that is killed while it holds their lock would stop all others for ever.
+    They are fewer where the system has no memory, process or file left for one more.
     """
 
     def __init__(self, n: int, piece: Callable[[int], Any]) -> None:
         context = multiprocessing.get_context("fork")
         self._processes: dict[Connection, ForkProcess] = {}
-        for _ in range(n):
-            own, other = context.Pipe()
-            ends = [*self._processes, own]
-            process = context.Process(target=_work, args=(piece, other, ends, os.getpid()), daemon=True)
+        with suppress(OSError):
+            for _ in range(n):
+                self._start(context, piece)
+
+    @property
+    def n(self) -> int:
+        """Processes that have started."""
+        return len(self._processes)
+
+    def _start(self, context: ForkContext, piece: Callable[[int], Any]) -> None:
+        own, other = context.Pipe()
+        ends = [*self._processes, own]
+        process = context.Process(target=_work, args=(piece, other, ends, os.getpid()), daemon=True)
+        try:
             with warnings.catch_warnings():
                 # Threads of this process wait for work while it is copied, and hold nothing that a copy needs.
                 warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
                 process.start()
+        except OSError:
+            own.close()
+            raise
+        finally:
             other.close()
-            self._processes[own] = process
+        self._processes[own] = process
 
     def results(self, n_pieces: int) -> Iterator[Any]:
         """Results in the order of their numbers; an error of one is raised.

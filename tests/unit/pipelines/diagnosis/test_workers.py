@@ -56,6 +56,29 @@ def test_results_of_processes_are_in_the_order_of_the_items(n_workers: int) -> N
 
 
 @pytest.mark.skipif(not FORKS, reason="no copies of processes here")
+@pytest.mark.parametrize("n_started", [0, 1, 2])
+def test_without_room_for_another_process_those_that_are_there_do_the_work(
+    n_started: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As fork says it where there is no memory: what has started goes on, and nothing is left open."""
+    start, started = multiprocessing.context.ForkProcess.start, list[int]()
+
+    def no_more(process: multiprocessing.context.ForkProcess) -> None:
+        if len(started) == n_started:
+            raise OSError(12, "Cannot allocate memory")
+        started.append(1)
+        start(process)
+
+    monkeypatch.setattr(multiprocessing.context.ForkProcess, "start", no_more)
+    opened = len(os.listdir("/proc/self/fd"))
+    found = list(Workers(3).map_apart(lambda n: (n * n, os.getpid()), range(9)))
+    assert [square for square, _ in found] == [n * n for n in range(9)]
+    assert len({pid for _, pid in found}) <= max(n_started, 1)
+    assert (os.getpid() in {pid for _, pid in found}) == (n_started == 0)
+    assert len(os.listdir("/proc/self/fd")) == opened
+
+
+@pytest.mark.skipif(not FORKS, reason="no copies of processes here")
 def test_long_pieces_are_done_by_processes_and_what_is_within_them_in_turn() -> None:
     workers = Workers(2)
     found = list(
