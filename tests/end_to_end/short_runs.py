@@ -10,6 +10,7 @@ from typing import Any
 import netCDF4
 import numpy as np
 import xarray as xr
+from progress_lines import without_progress
 
 from acquisition.virtual_laboratory.campaign import rig_text
 from acquisition.virtual_laboratory.shaker_run import virtual_shaker_run, write_virtual_run
@@ -72,7 +73,8 @@ def refusal(capsys: Any, arguments: Sequence[str], output: Path, *fragments: str
 
 
 def assert_one_line(stderr: str, *fragments: str) -> None:
-    """One line, no traceback, and every fragment in it."""
+    """One line besides those of progress, no traceback, and every fragment in it."""
+    stderr = without_progress(stderr)
     assert stderr.startswith("sloshlab: ")
     assert stderr.endswith("\n")
     assert stderr.count("\n") == 1, stderr

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from progress_lines import without_progress
 
 from pipelines.command_line import run
 from sloshlab.reduced_order_model.ensemble import PROBABILITIES, Ensemble, ResidualSpread
@@ -163,7 +164,7 @@ def test_what_cannot_be_done_is_one_line(
     model_of: object, tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
 ) -> None:
     assert run(["aircraft", str(model_of("case_1")), *arguments, "-o", str(tmp_path / "out")]) == 1
-    error = capsys.readouterr().err
+    error = without_progress(capsys.readouterr().err)
     assert message in error
     assert error.count("\n") == 1
     assert not (tmp_path / "out").exists()
@@ -192,7 +193,7 @@ def test_tanks_that_cannot_be_are_one_line(
 ) -> None:
     model = model_of("case_1", change)
     assert run(["aircraft", str(model), "--rom", str(rom), "-o", str(tmp_path / "out")]) == 1
-    error = capsys.readouterr().err
+    error = without_progress(capsys.readouterr().err)
     assert message in error
     assert error.count("\n") == 1
 
@@ -215,6 +216,6 @@ def test_bad_scans_are_one_line(
     (tmp_path / "scan.toml").write_text(text, encoding="utf-8")
     arguments = ["--scan", str(tmp_path / "scan.toml"), "-o", str(tmp_path / "out")]
     assert run(["aircraft", str(model_of("case_1")), *arguments]) == 1
-    error = capsys.readouterr().err
+    error = without_progress(capsys.readouterr().err)
     assert message in error
     assert error.count("\n") == 1

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import xarray as xr
+from progress_lines import without_progress
 
 from pipelines.command_line import run
 from sloshlab.bouncing_ball.ball import BouncingBall
@@ -74,7 +75,7 @@ def ball_decay() -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
 
 def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
     assert run([str(argument) for argument in arguments]) == 1
-    [line] = capsys.readouterr().err.strip().splitlines()
+    [line] = without_progress(capsys.readouterr().err).strip().splitlines()
     return line
 
 

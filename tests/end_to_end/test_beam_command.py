@@ -10,6 +10,7 @@ import beam_runs
 import numpy as np
 import pytest
 import xarray as xr
+from progress_lines import without_progress
 from short_runs import DONE_BUT_FLAGGED, refusal
 
 from acquisition.virtual_laboratory.cantilever import fitted_to
@@ -377,7 +378,7 @@ def test_make_says_in_one_line_that_a_folder_is_not_there(
 ) -> None:
     monkeypatch.setattr("sys.argv", ["experiments", experiment, str(tmp_path / "none"), str(tmp_path / "out")])
     assert experiments.main() == 1
-    said = capsys.readouterr().err
+    said = without_progress(capsys.readouterr().err)
     assert said.startswith("sloshlab: ")
     assert said.count("\n") == 1
     assert "no such folder" in said

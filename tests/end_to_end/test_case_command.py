@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from progress_lines import without_progress
 from short_runs import INPUT_IS_BAD, contents, leftovers, refusal
 
 from pipelines.command_line import run
@@ -60,7 +61,7 @@ def test_every_defect_of_a_case_is_a_line_on_stderr_and_nothing_is_left(
     captured = capsys.readouterr()
     assert code == INPUT_IS_BAD
     assert captured.out == ""
-    lines = captured.err.splitlines()
+    lines = without_progress(captured.err).splitlines()
     assert len(lines) == 2
     assert all(line.startswith("sloshlab: ") and "; remedy: " in line for line in lines)
     assert contents(case) is None

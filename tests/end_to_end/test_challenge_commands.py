@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from progress_lines import without_progress
 
 from pipelines.command_line import run
 from tests.unit.sealed_trial.hand_made_challenges import TRUTHS, answering, verdict, written_challenge
@@ -151,7 +152,7 @@ def test_answers_that_came_with_a_folder_are_told_and_believed_by_nobody(content
     assert run(["trial", "check", "c"]) == 0
     assert "1 answers are there already; remove c/diagnoses unless they are your own" in capsys.readouterr().out
     assert run(["trial", "run", "c", "--cases", "quiet"]) == 1
-    error = capsys.readouterr().err
+    error = without_progress(capsys.readouterr().err)
     assert "c/diagnoses/quiet/outcome.json: got something else" in error
     assert error.count("\n") == 1
 
@@ -237,7 +238,7 @@ def test_what_cannot_be_done_is_said_in_one_line(name: str, here, capsys) -> Non
     assert run(["trial", *words]) == 1
     captured = capsys.readouterr()
     assert said in captured.err
-    assert captured.err.count("\n") == 1
+    assert without_progress(captured.err).count("\n") == 1
     assert captured.out == ""
     assert {path: path.read_bytes() for path in here.rglob("*") if path.is_file()} == before
 
@@ -249,7 +250,7 @@ def test_every_defect_has_a_line_of_its_own_and_no_code_is_run(here, capsys) -> 
     Path("truths.json").write_text('{"quiet": {"hidden": "nothing"}}')
     capsys.readouterr()
     assert run(["trial", "check", "c"]) == 1
-    lines = capsys.readouterr().err.splitlines()
+    lines = without_progress(capsys.readouterr().err).splitlines()
     assert len(lines) == 5
     for line, said in zip(
         lines,
@@ -270,7 +271,7 @@ def test_a_rig_that_names_files_elsewhere_is_refused(here, capsys) -> None:
     rig = Path("c/cases/quiet/rig.toml")
     rig.write_text(rig.read_text().replace('"frozen"', '"rom"\nparameters = { rom = "../../../kept/key.nc" }'))
     assert run(["trial", "check", "c"]) == 1
-    error = capsys.readouterr().err
+    error = without_progress(capsys.readouterr().err)
     assert "got the path '../../../kept/key.nc'; allowed: files of its own case" in error
     assert error.count("\n") == 1
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from progress_lines import without_progress
 
 from pipelines.command_line import run
 
@@ -104,7 +105,7 @@ def test_bad_models_are_one_line(
     model = tmp_path / "model.toml"
     model.write_text(goland.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
     assert run(["flutter", str(model), "-o", str(tmp_path / "out"), "--from", "60", "--to", "90"]) == 1
-    error = capsys.readouterr().err
+    error = without_progress(capsys.readouterr().err)
     assert message in error
     assert error.count("\n") == 1
     assert not (tmp_path / "out").exists()
@@ -184,7 +185,7 @@ def test_bad_aircraft_are_one_line(
 ) -> None:
     flying_wing.write_text(flying_wing.read_text(encoding="utf-8") + extra + "\n", encoding="utf-8")
     assert run(["flutter", str(flying_wing), "-o", str(tmp_path / "out"), "--models", models]) == 1
-    error = capsys.readouterr().err
+    error = without_progress(capsys.readouterr().err)
     assert message in error
     assert error.count("\n") == 1
     assert not (tmp_path / "out").exists()
@@ -238,7 +239,7 @@ def test_a_missing_panelaero_is_one_line(
     monkeypatch.delitem(sys.modules, "panelaero.VLM", raising=False)
     monkeypatch.delitem(sys.modules, "panelaero.DLM", raising=False)
     code = run(["flutter", str(lattice_model), "-o", str(tmp_path / "out"), "--from", "100", "--to", "150"])
-    error = capsys.readouterr().err
+    error = without_progress(capsys.readouterr().err)
     assert code == 1
     assert error.count("\n") == 1
     assert "pip install 'sloshlab[aircraft]'" in error

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from progress_lines import without_progress
 from short_runs import DONE_BUT_FLAGGED, INTERRUPTED, contents, leftovers, shaker_arguments
 
 import pipelines.sweep.outputs
@@ -53,7 +54,7 @@ def test_interrupted_at_a_known_place(
     monkeypatch.setattr(module, name, interrupted)
     assert run(arguments_for(laboratory, tmp_path / "out")) == INTERRUPTED
     captured = capsys.readouterr()
-    assert captured.err.strip() == "sloshlab: interrupted; nothing half-written"
+    assert without_progress(captured.err).strip() == "sloshlab: interrupted; nothing half-written"
     assert captured.out == ""
     assert list(tmp_path.iterdir()) == []
 
@@ -117,7 +118,7 @@ def test_signals_at_many_moments(signal_name: str, laboratory: Path, tmp_path: P
             assert complete <= set(written or {})
         elif process.returncode == 128 + sent:
             assert written is None
-            assert stderr.strip() == f"sloshlab: {said}; nothing half-written"
+            assert without_progress(stderr).strip() == f"sloshlab: {said}; nothing half-written"
         else:  # the interpreter was still loading the command
             assert process.returncode == -sent
             assert written is None

@@ -15,6 +15,7 @@ import pytest
 import xarray as xr
 from beam_runs import make_beam_folder
 from matplotlib.figure import Figure
+from progress_lines import without_progress
 from short_runs import contents, make_laboratory, rig_text, short_run
 from test_diagnose_command import case, decay
 
@@ -158,7 +159,7 @@ def test_errors_are_the_lines_of_the_commands(laboratory: Path, what: str, capsy
     with pytest.raises(sl.SloshlabError) as raised:
         call(laboratory)
     assert run(arguments(laboratory)) == 1
-    assert capsys.readouterr().err == f"sloshlab: {raised.value}\n"
+    assert without_progress(capsys.readouterr().err) == f"sloshlab: {raised.value}\n"
     assert contents(laboratory) == before
 
 
@@ -256,7 +257,7 @@ def test_a_verdict_in_python_is_that_of_the_command(
         written = tmp_path / "elsewhere" / "python" / name
         assert written.read_bytes() == (tmp_path / "command" / name).read_bytes()
     assert (found.kind, found.effects) == ("nothing_missing", [])
-    assert said.err == "".join(f"flagged: {flag}\n" for flag in found.flags)
+    assert without_progress(said.err) == "".join(f"flagged: {flag}\n" for flag in found.flags)
     assert found.headline in said.out
     shown = found._repr_html_()
     assert found.headline in shown

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 import pytest
+from progress_lines import without_progress
 
 from pipelines.command_line import run
 from sealed_trial.running import Outcome
@@ -63,7 +64,7 @@ def test_what_cannot_be_done_is_said_in_one_line(tmp_path, monkeypatch, capsys, 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.argv", ["sloshlab"])
     assert run(["trial", *options]) == 1
-    error = capsys.readouterr().err
+    error = without_progress(capsys.readouterr().err)
     assert said in error
     assert error.count("\n") == 1
     assert list(tmp_path.iterdir()) == []

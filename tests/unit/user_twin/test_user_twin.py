@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from progress_lines import without_progress
 from recorded_oscillators import fitted_from
 from scipy.integrate import solve_ivp
 
@@ -452,7 +453,7 @@ class TestBadInput:
         if source is not None:
             file.write_text(source)
         assert command(["diagnose", str(case), "--twin", str(file), "-o", str(tmp_path / "out")]) == 1
-        message = capsys.readouterr().err
+        message = without_progress(capsys.readouterr().err)
         assert expected in message
         assert message.count("\n") == 1
         assert "Traceback" not in message

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
+from progress_lines import without_progress
 from scipy.io import savemat
 from synthetic_files import write_ramps, write_tanks
 
@@ -22,7 +23,7 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     """The one line in which a command is refused."""
     assert run(["benchmark", *arguments]) == INPUT_IS_BAD
     said = capsys.readouterr()
-    [line] = said.err.splitlines()
+    [line] = without_progress(said.err).splitlines()
     return line
 
 

@@ -6,6 +6,7 @@ import threading
 import time
 
 import pytest
+from progress_lines import without_progress
 
 from pipelines.report import progress as module
 from pipelines.report.progress import amounts
@@ -21,10 +22,14 @@ def test_a_long_step_is_no_silence(capsys: pytest.CaptureFixture[str]) -> None:
     with amounts("searching") as advance:
         advance(1, 4, "the first step")
         time.sleep(0.6)
-    lines = capsys.readouterr().err.splitlines()
+    said = capsys.readouterr().err
+    lines = said.splitlines()
     assert len(lines) >= 3
     assert all("so far: the first step, 25 %" in line for line in lines[:-1])
     assert lines[-1].endswith("done")
+    # what is no progress is left, its neighbours with the same words, too
+    others = ("flagged: a sweep, 40 s long, is done\n", "sloshlab: got nothing so far\n")
+    assert without_progress(said.join(others)) == "".join(others)
 
 
 @pytest.mark.parametrize("fails", [False, True])
