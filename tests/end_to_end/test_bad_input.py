@@ -11,6 +11,7 @@ import netCDF4
 import numpy as np
 import pytest
 from short_runs import RATE_HZ, cut_out, edited, refusal, shaker_arguments, short_run
+from slow_cases import slow_but
 
 from acquisition.virtual_laboratory.campaign import rig_text
 from acquisition.virtual_laboratory.shaker_run import write_virtual_run
@@ -295,7 +296,10 @@ def test_rig_that_is_missing_or_a_folder(laboratory: Path, tmp_path: Path, capsy
         refusal(capsys, arguments, tmp_path / "out", rig.name, reason)
 
 
-@pytest.mark.parametrize("share", [0.0, 1e-5, 0.001, 0.02, 0.1, 0.3, 0.5, 0.8, 0.97, 0.9999])
+SHARES = (0.0, 1e-5, 0.001, 0.02, 0.1, 0.3, 0.5, 0.8, 0.97, 0.9999)
+
+
+@pytest.mark.parametrize("share", slow_but([1e-5, 0.02, 0.9999], SHARES))
 @pytest.mark.parametrize("command", ["shaker", "work", "check"])
 def test_file_cut_in_the_middle(share: float, command: str, laboratory: Path, tmp_path: Path, capsys: Any) -> None:
     whole = (laboratory / "sweep_3g.nc").read_bytes()

@@ -5,12 +5,15 @@ The law is `acquisition.virtual_laboratory.liquid_law`; it shares no code with t
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from slow_cases import slow_but
 
 from acquisition.virtual_laboratory.campaign import FILL_LEVELS
 from acquisition.virtual_laboratory.liquid_force import REGIMES, regime_weights
@@ -29,18 +32,34 @@ class Campaign:
     exit_code: int
 
     def of(self, fill_level: float) -> xr.Dataset:
-        return self.maps.sel(fill_level=fill_level)
+        return self.maps.sel(fill_level=fill_level) if "fill_level" in self.maps.dims else self.maps
 
     def windows_of(self, fill_level: float) -> xr.Dataset:
         return self.windows.isel(window=np.flatnonzero(np.isclose(self.windows.fill_level, fill_level)))
 
 
 @pytest.fixture(scope="session")
-def campaign(repository: Path, tmp_path_factory: pytest.TempPathFactory) -> Campaign:
-    """All runs and rigs of raw_data/shaker, analysed as `make shaker` does but without the report."""
-    output = tmp_path_factory.mktemp("campaign") / "out"
-    code = run([*shaker_arguments(repository / "raw_data" / "shaker", output), "--no-report"])
-    return Campaign(xr.load_dataset(output / "windows.nc"), xr.load_dataset(output / "maps.nc"), code)
+def campaign_of(repository: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Campaign]:
+    """Runs and rigs of raw_data/shaker whose names hold a word, as `make shaker` analyses them, without report."""
+
+    @functools.cache
+    def analysed(word: str) -> Campaign:
+        folder, output = tmp_path_factory.mktemp("recordings"), tmp_path_factory.mktemp("campaign") / "out"
+        for path in (repository / "raw_data" / "shaker").iterdir():
+            if word in path.name:
+                (folder / path.name).symlink_to(path)
+        code = run([*shaker_arguments(folder, output), "--no-report"])
+        return Campaign(xr.load_dataset(output / "windows.nc"), xr.load_dataset(output / "maps.nc"), code)
+
+    return analysed
+
+
+@pytest.fixture
+def campaign(request: pytest.FixtureRequest, campaign_of: Callable[[str], Campaign]) -> Campaign:
+    """All tanks for a slow test, or the half-filled one, which is that of the published numbers."""
+    if request.node.get_closest_marker("slow"):
+        return campaign_of("")
+    return campaign_of("fill_0.50")
 
 
 def relative_rms(recovered: np.ndarray, law: np.ndarray) -> float:
@@ -56,13 +75,14 @@ def grid_of(dataset: xr.Dataset, amplitude: str) -> tuple[np.ndarray, np.ndarray
     return omega_bar, second / omega_bar if amplitude == "v_bar" else second
 
 
+@pytest.mark.slow
 def test_the_campaign_is_done_and_its_lost_samples_are_flagged(campaign: Campaign) -> None:
     assert campaign.exit_code == DONE_BUT_FLAGGED
     assert sorted(campaign.maps.fill_level.values) == list(FILL_LEVELS)
     assert np.unique(campaign.windows.run).size == 30
 
 
-@pytest.mark.parametrize("fill_level", FILL_LEVELS)
+@pytest.mark.parametrize("fill_level", slow_but([0.5], FILL_LEVELS))
 @pytest.mark.parametrize(("suffix", "amplitude"), [("", "u_bar"), ("_over_v_bar", "v_bar")])
 def test_maps_are_within_three_percent_of_the_law(fill_level, suffix, amplitude, campaign: Campaign) -> None:
     maps = campaign.of(fill_level)
@@ -72,7 +92,7 @@ def test_maps_are_within_three_percent_of_the_law(fill_level, suffix, amplitude,
         assert error < 0.03, f"{name}{suffix} at α = {fill_level}: {error:.4f}"
 
 
-@pytest.mark.parametrize("fill_level", FILL_LEVELS)
+@pytest.mark.parametrize("fill_level", slow_but([0.5], FILL_LEVELS))
 def test_windows_of_sweeps_are_within_three_percent_of_the_law(fill_level: float, campaign: Campaign) -> None:
     windows = sweeps_of(campaign.windows_of(fill_level))
     windows = windows.isel(window=np.flatnonzero(windows.time_s > 1.0))
@@ -82,9 +102,10 @@ def test_windows_of_sweeps_are_within_three_percent_of_the_law(fill_level: float
         assert error < 0.03, f"{name} at α = {fill_level}: {error:.4f}"
 
 
-def test_no_window_gives_energy(campaign: Campaign) -> None:
+@pytest.mark.parametrize("tanks", slow_but(["fill_0.50"], ["fill_0.50", ""]))
+def test_no_window_gives_energy(tanks: str, campaign_of: Callable[[str], Campaign]) -> None:
     """A liquid takes energy: no work is negative beyond five of its standard errors and 2 % of the largest."""
-    windows = campaign.windows
+    windows = campaign_of(tanks).windows
     assert (windows.w_bar > -np.maximum(5 * windows.w_bar_std, 0.03)).all()
 
 
@@ -93,7 +114,7 @@ def sweeps_of(windows: xr.Dataset) -> xr.Dataset:
     return windows.isel(window=np.flatnonzero(np.char.find(windows.run.values.astype(str), "vfa") < 0))
 
 
-@pytest.mark.parametrize("fill_level", FILL_LEVELS)
+@pytest.mark.parametrize("fill_level", slow_but([0.5], FILL_LEVELS))
 def test_standard_errors_cover_the_law(fill_level: float, campaign: Campaign) -> None:
     """Errors are as large as their standard errors say, or smaller.
 
@@ -152,6 +173,7 @@ def test_effective_mass_is_negative_and_its_mean_at_a_quarter_g(campaign: Campai
     assert mean == pytest.approx(-0.154, rel=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("acceleration_g", [1.5, 3.0])
 def test_half_full_does_most_work_at_9_and_13_hz_but_not_at_17(acceleration_g: float, campaign: Campaign) -> None:
     work = {fill: {} for fill in FILL_LEVELS}
@@ -169,7 +191,7 @@ def test_half_full_does_most_work_at_9_and_13_hz_but_not_at_17(acceleration_g: f
     assert largest[17.0] != 0.5
 
 
-@pytest.mark.parametrize("fill_level", FILL_LEVELS)
+@pytest.mark.parametrize("fill_level", slow_but([0.5], FILL_LEVELS))
 def test_regimes_agree_with_the_generator_where_it_is_unambiguous(fill_level: float, campaign: Campaign) -> None:
     windows = campaign.windows_of(fill_level)
     weights = regime_weights(windows.omega_bar.values, windows.u_bar.values, fill_level)
@@ -181,7 +203,7 @@ def test_regimes_agree_with_the_generator_where_it_is_unambiguous(fill_level: fl
     assert agreement >= 0.8, f"α = {fill_level}: {agreement:.3f}"
 
 
-@pytest.mark.parametrize("fill_level", FILL_LEVELS)
+@pytest.mark.parametrize("fill_level", slow_but([0.5], FILL_LEVELS))
 def test_nothing_is_drawn_far_from_the_windows(fill_level: float, campaign: Campaign) -> None:
     """Every drawn point has windows of a run above and one below, or lies on a run."""
     maps, windows = campaign.of(fill_level), campaign.windows_of(fill_level)
@@ -197,7 +219,7 @@ def test_nothing_is_drawn_far_from_the_windows(fill_level: float, campaign: Camp
     assert not drawn[level > np.log2(6.4)].any()
 
 
-@pytest.mark.parametrize("fill_level", FILL_LEVELS)
+@pytest.mark.parametrize("fill_level", slow_but([0.5], FILL_LEVELS))
 def test_work_map_and_non_dimensional_map_are_one(fill_level: float, campaign: Campaign) -> None:
     """W(f, u₀) = W̄ m_l (Ωu₀)²; two grids, so the comparison interpolates."""
     maps = campaign.of(fill_level)

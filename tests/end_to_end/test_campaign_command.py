@@ -76,8 +76,8 @@ def test_nothing_is_analysed_twice_and_a_changed_run_is(carried_out, laboratory,
 
 def test_a_failed_task_is_a_line_and_the_others_are_done(laboratory, tmp_path, capsys) -> None:
     own, store = tmp_path / "laboratory", tmp_path / "store"
-    shutil.copytree(laboratory, own)
-    with xr.open_dataset(own / "sweep_1.5g.nc", mask_and_scale=False, decode_times=False) as recording:
+    shutil.copytree(laboratory, own, ignore=shutil.ignore_patterns("sweep_1.5g.nc"))
+    with xr.open_dataset(own / "sweep_3g.nc", mask_and_scale=False, decode_times=False) as recording:
         half = recording.isel(time=slice(0, recording.sizes["time"] // 2)).load()
     half.attrs["sweep_duration_s"] = 48.0
     half.to_netcdf(own / "sweep_cut.nc")
@@ -87,7 +87,7 @@ def test_a_failed_task_is_a_line_and_the_others_are_done(laboratory, tmp_path, c
     assert line.startswith("flagged: sweep_cut failed: ")
     assert "Traceback" not in error
     rows = rows_of(store)
-    assert [rows[name]["status"] for name in ("sweep_1.5g", "sweep_3g", "sweep_cut")] == ["done", "done", "failed"]
+    assert [rows[name]["status"] for name in ("sweep_3g", "sweep_cut")] == ["done", "failed"]
     # what fails once fails again: nothing is tried
     began = (store / "results/sweep_cut/outcome.json").stat().st_mtime_ns
     assert run(["campaign", str(own), "-o", str(store)]) == DONE_BUT_FLAGGED

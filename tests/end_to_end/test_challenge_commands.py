@@ -113,6 +113,7 @@ def test_truths_that_nobody_committed_to_are_counted_and_flagged(here, monkeypat
     assert scores["rates"]["wrong names anywhere"]["successes"] == 1
 
 
+@pytest.mark.slow
 def test_a_name_that_the_vocabulary_lacks_is_outside_and_said_to_be(here, monkeypatch, capsys) -> None:
     Path("kept/t.toml").write_text(TRUTHS.replace("cubic_stiffness", "gear_rattle"))
     assert run(["trial", "commit", "c", "kept/t.toml", "-o", "kept/t.json"]) == 0
@@ -123,6 +124,7 @@ def test_a_name_that_the_vocabulary_lacks_is_outside_and_said_to_be(here, monkey
     assert scores["rates"]["outside the vocabulary, unknown with the right block"]["value"] == 1.0
 
 
+@pytest.mark.slow
 def test_answers_that_were_changed_after_the_freeze_are_not_scored(here, monkeypatch, capsys) -> None:
     assert run(["trial", "commit", "c", "kept/t.toml", "-o", "kept/t.json"]) == 0
     answered(here, monkeypatch, {**RIGHT, "cart": verdict("nothing_missing")})
@@ -134,6 +136,7 @@ def test_answers_that_were_changed_after_the_freeze_are_not_scored(here, monkeyp
     assert not Path("scores").exists()
 
 
+@pytest.mark.slow
 def test_some_cases_alone_are_answered_and_nothing_is_frozen(here, monkeypatch, capsys) -> None:
     monkeypatch.setattr("pipelines.diagnosis.challenge.DIAGNOSE", answering(here / "kept", RIGHT))
     assert run(["trial", "run", "c", "--cases", "quiet"]) == 0

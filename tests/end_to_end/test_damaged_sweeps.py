@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from slow_cases import slow_but
 
 from sloshlab.recording import read_recording
 from studies.consistency_sensitivity.damages import DAMAGES, FORCES, Case, changed
@@ -37,6 +38,17 @@ SILENT_ONCE = [
     ("noise on the forces", 1.0),
     ("acceleration_g", 5 / 3),
 ]
+QUICK = [
+    ("forces early", 1.0),
+    ("one cell late", 1.0),
+    ("samples dropped from the forces", 20.0),
+    ("forces clipped", 0.7),
+    ("forces strong", 1.05),
+    ("a cell stuck", 10.0),
+    ("sampling rate wrong", 1.0),
+    ("dry mass of the rig file, no dry runs", 1.05),
+]
+"""One of each kind: time, a cell alone, lost samples, range, gain, a sensor that stands still, attributes, rig."""
 
 
 @pytest.fixture(scope="module")
@@ -68,8 +80,11 @@ def test_the_undamaged_sweep_is_not_flagged(case, tmp_path, alone):
     assert [flag for flag in flags if "sweep stops" not in flag] == []
 
 
-@pytest.mark.parametrize(("name", "size"), SILENT_ONCE, ids=[f"{name} {size:g}" for name, size in SILENT_ONCE])
-def test_a_damage_is_flagged_or_refused(case, tmp_path, name, size):
+@pytest.mark.parametrize(
+    "damage", slow_but(QUICK, SILENT_ONCE), ids=[f"{name} {size:g}" for name, size in SILENT_ONCE]
+)
+def test_a_damage_is_flagged_or_refused(case, tmp_path, damage):
+    name, size = damage
     damaged = DAMAGE[name].apply(case, size, np.random.default_rng(1))
     assert said(damaged, tmp_path)
 

@@ -26,6 +26,7 @@ from short_runs import (
     shaker_arguments,
     short_run,
 )
+from slow_cases import slow_but
 
 from acquisition.virtual_laboratory.shaker_run import write_virtual_run
 from pipelines.command_line import run
@@ -194,7 +195,7 @@ def test_order_of_the_runs_changes_no_number(laboratory: Path, tmp_path: Path) -
     np.testing.assert_array_equal(np.sort(first.work_j), np.sort(second.work_j))
 
 
-@pytest.mark.parametrize("kind", ["text", "cut"])
+@pytest.mark.parametrize("kind", slow_but(["text"], ["text", "cut"]))
 def test_the_installed_command_refuses_in_one_line(kind: str, laboratory: Path, tmp_path: Path) -> None:
     whole = (laboratory / "sweep_3g.nc").read_bytes()
     (tmp_path / "bad.nc").write_bytes(b"time;force\n" * 50 if kind == "text" else whole[: len(whole) // 2])

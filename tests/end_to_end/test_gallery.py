@@ -75,6 +75,7 @@ def test_the_map_is_that_of_the_law(run_script: Callable[[str], Names]) -> None:
     assert float(names["strongest"]["omega_bar"]) == pytest.approx(3.78, rel=0.1)
 
 
+@pytest.mark.slow
 def test_beta_is_that_of_a_mass_on_a_spring_and_changes_its_sign_there(run_script: Callable[[str], Names]) -> None:
     """The apparent mass m k/(k − mω²) with the damper c in parallel, in other letters than the script has it."""
     names = run_script("04_beta_and_its_sign")
@@ -91,6 +92,7 @@ def test_beta_is_that_of_a_mass_on_a_spring_and_changes_its_sign_there(run_scrip
     assert means["fill_0.50_sweep_3.00g", 10] < -0.1
 
 
+@pytest.mark.slow
 def test_three_readings_of_the_decay_of_a_linear_beam_agree(run_script: Callable[[str], Names]) -> None:
     names = run_script("05_damping_three_ways")
     readings = names["frozen"]

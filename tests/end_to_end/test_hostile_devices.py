@@ -20,6 +20,7 @@ import pytest
 from live_commands import Command, running, visible, wait_until
 from progress_lines import without_progress
 from short_runs import DONE_BUT_FLAGGED, INPUT_IS_BAD, assert_one_line
+from slow_cases import slow_but
 
 from acquisition.files.can_database_text import dbc_text
 from acquisition.samples.channel import Channel
@@ -150,6 +151,8 @@ CASES = {
     "a socketcand of noise": Case(noise, ("< hi >",), is_can=True),
     "text without >": Case(text_without_an_end, ("< hi there", "< hi >"), is_can=True),
 }
+QUICK = ("random bytes", "jumping counters", "a socketcand of noise")
+"""What decoders do with the others is in tests/property and tests/unit/acquisition/wire."""
 
 
 @contextlib.contextmanager
@@ -213,7 +216,7 @@ def lab(tmp_path: Path, repository: Path) -> Path:
     return tmp_path / "lab"
 
 
-@pytest.mark.parametrize("name", list(CASES))
+@pytest.mark.parametrize("name", slow_but(QUICK, CASES))
 def test_a_hostile_peer_ends_in_one_line(name: str, lab: Path) -> None:
     case = CASES[name]
     with listening(case.peer) as port, recording_of(case, port, lab) as recorder:

@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 from progress_lines import without_progress
 from short_runs import DONE_BUT_FLAGGED, INTERRUPTED, contents, leftovers, shaker_arguments
+from slow_cases import slow_but
 
 import pipelines.sweep.outputs
 import pipelines.sweep.report
@@ -22,6 +23,7 @@ from pipelines.command_line import run
 from sloshlab import atomic_file
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="SIGINT is sent to a process of its own")
+SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 PLACES = {
     "after the first run": (pipelines.sweep.stages, "evaluate_windows"),
     "before windows.nc": (pipelines.sweep.outputs, "write_dataset"),
@@ -92,7 +94,7 @@ def test_interrupt_leaves_earlier_results_alone(laboratory: Path, tmp_path: Path
     assert leftovers(tmp_path) == []
 
 
-@pytest.mark.parametrize("signal_name", ["SIGINT", "SIGTERM", "SIGHUP"])
+@pytest.mark.parametrize("signal_name", slow_but(["SIGINT"], SIGNALS))
 def test_signals_at_many_moments(signal_name: str, laboratory: Path, tmp_path: Path) -> None:
     """Wherever the signal falls, the folder is complete or absent; no moment is assumed to be in any stage."""
     command = [str(Path(sys.executable).with_name("sloshlab"))]
@@ -125,7 +127,7 @@ def test_signals_at_many_moments(signal_name: str, laboratory: Path, tmp_path: P
     assert 128 + sent in codes
 
 
-@pytest.mark.parametrize("signal_name", ["SIGINT", "SIGTERM", "SIGHUP"])
+@pytest.mark.parametrize("signal_name", slow_but(["SIGTERM"], SIGNALS))
 def test_a_signal_after_the_command_is_done_changes_nothing(signal_name: str) -> None:
     """The interpreter takes a while to end; what was done has its own exit code and says nothing more."""
     script = (

@@ -217,6 +217,7 @@ def test_a_recorder_that_is_killed_takes_its_page_along(bench: Path, lab: Path) 
         wait_until(lambda: not Path(f"/proc/{page}").exists(), "the end of the page")
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_one_line_and_nothing_is_lost(bench: Path, lab: Path) -> None:
     source = ["--source", f"file:{bench / 'run.nc'}?speed=10"]
 

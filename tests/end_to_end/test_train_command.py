@@ -270,6 +270,7 @@ def small_study(folder, tmp_path, monkeypatch) -> list[str]:
     return ["study", *runs, *options, *still(folder), "-o", str(tmp_path / "study"), "--json"]
 
 
+@pytest.mark.slow
 def test_a_study_picks_by_validation_error_and_goes_on(small_study, folder, tmp_path, capsys) -> None:
     assert run(small_study) == 0
     said = json.loads(capsys.readouterr().out.splitlines()[-1])

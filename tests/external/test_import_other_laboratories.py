@@ -27,6 +27,7 @@ def mapped(folder: Path, body: str) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_every_file_is_described_or_refused_in_one_line(external_data: Path) -> None:
     files = [path for path in sorted(external_data.rglob("*")) if path.is_file()]
     described = 0
@@ -43,6 +44,7 @@ def test_every_file_is_described_or_refused_in_one_line(external_data: Path) -> 
     assert not [refusal for refusal in refusals if "\n" in refusal]
 
 
+@pytest.mark.slow
 def test_every_reading_column_of_the_formats_imports(external_data: Path, tmp_path: Path) -> None:
     """Each column with a rate becomes a channel with the same number of samples, all of them kept."""
     imported = 0

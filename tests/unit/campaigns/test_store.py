@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
+from slow_cases import slow_but
 
 from campaigns.campaign import run_campaign
 from campaigns.local_executor import LocalExecutor
@@ -272,7 +273,7 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("number", slow_but([signal.SIGKILL], [signal.SIGINT, signal.SIGTERM, signal.SIGKILL]))
 def test_a_campaign_that_is_stopped_goes_on_to_the_same_bytes(recordings, tmp_path, number):
     for more in range(6):
         (recordings / f"more_{more}.bin").write_bytes(bytes([65 + more]))

@@ -23,6 +23,7 @@ from recorded_oscillators import (
     surroundings,
 )
 from scipy.interpolate import make_interp_spline
+from slow_cases import slow_but
 
 from sloshlab.identification.case import CaseRun
 from sloshlab.identification.free_run_problem import FreeRunProblem
@@ -153,7 +154,7 @@ def test_the_line_of_a_machine_comes_back_with_its_phase_in_every_run(tmp_path: 
     assert_come_back(problem, candidate, starts, truth, {"phase in run_0": 0.02, "phase in run_1": 0.02})
 
 
-@pytest.mark.parametrize("down_n", [0.5, 0.9])
+@pytest.mark.parametrize("down_n", slow_but([0.5], [0.5, 0.9]))
 def test_a_slider_behind_a_play_comes_back_by_direction(tmp_path: Path, down_n: float) -> None:
     up_n, play, stiffness = 0.5, 0.004, 600.0
     runs = [

@@ -176,6 +176,8 @@ HIDDEN: dict[str, tuple[Callable[[], list[CaseRun]], dict[str, float], tuple[str
 
 
 LIKE_OTHERS = {
+    "structure.mass_error",
+    "structure.stiffness_change",
     "structure.asymmetric_friction",
     "tank.viscous_damping",
     "tank.mass_error",

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from recorded_oscillators import decays, effect, rig, run_of, surroundings
 from scipy.integrate import solve_ivp
+from slow_cases import slow_but
 
 from sloshlab.identification.rig_model import RigModel, steps_per_sample
 from sloshlab.missing_force.force_matching import ForceMatching, Match, matchings
@@ -279,10 +280,10 @@ def test_a_force_within_its_noise_is_told_from_others() -> None:
     ("key", "compares"),
     [
         ("structure.viscous_damping", False),
-        ("structure.constant_force", False),
-        ("structure.missing_mode", False),
+        pytest.param("structure.constant_force", False, marks=pytest.mark.slow),
+        pytest.param("structure.missing_mode", False, marks=pytest.mark.slow),
         ("structure.cubic_stiffness", True),
-        ("structure.coulomb_friction", True),
+        pytest.param("structure.coulomb_friction", True, marks=pytest.mark.slow),
         ("structure.hysteresis", True),
     ],
 )
@@ -309,7 +310,7 @@ def test_a_multiple_stays_within_the_bounds_of_every_size(tmp_path: Path) -> Non
     assert match.misfit == pytest.approx((1 - (1 / 0.9) / 1.5) ** 2, rel=1e-6)
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("sign", slow_but([1.0], [1.0, -1.0]))
 def test_what_does_not_run_matches_worst(tmp_path: Path, sign: float) -> None:
     known = candidate(tmp_path, "tank.ceiling_impact")
     # Springs that the weight of the liquid presses through.

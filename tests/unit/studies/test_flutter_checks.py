@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 
 import pytest
+from slow_cases import slow_but
 
 from studies.flutter_checks import (
     Check,
@@ -33,7 +34,7 @@ def test_numbers_are_reached(part: Callable[[], Iterator[Check]]) -> None:
 
 
 @pytest.mark.skipif(find_spec("panelaero") is None, reason="PanelAero is not installed: extra aircraft")
-@pytest.mark.parametrize("part", OF_LATTICE)
+@pytest.mark.parametrize("part", slow_but([lattice], OF_LATTICE))
 def test_numbers_of_the_lattice_are_reached(part: Callable[[], Iterator[Check]]) -> None:
     assert missed(part()) == []
 

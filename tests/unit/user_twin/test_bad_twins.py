@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numba import njit
 from progress_lines import without_progress
+from slow_cases import slow_but
 
 from pipelines.command_line import run as command
 from sloshlab.errors import InputError
@@ -162,6 +163,27 @@ BAD = {
 }
 
 
+QUICK = (
+    "raises",
+    "ends the process",
+    "imports what is not there",
+    "writes into its inputs",
+    "not a number from a sample on",
+    "a sample too few",
+    "nothing",
+    "a mass in words",
+    "equations that raise",
+    "a rate that is no number",
+    "no tuple",
+    "a start that no channel tells",
+    "parameters that are none",
+    "a drive that is a number",
+    "a damper that drives",
+    "a force that is no number",
+)
+"""Of each way to describe a twin what goes wrong when it is read, compiled, run and looked at."""
+
+
 def refused(twin: str, folder: Path, capsys: pytest.CaptureFixture[str], *, lost: slice = slice(0, 0)) -> str:
     """The one line with which a diagnosis of two runs ends; samples of a channel may be lost."""
     case, file, channel = folder / "case", folder / "twin.py", "displacement_cart"
@@ -183,7 +205,7 @@ def refused(twin: str, folder: Path, capsys: pytest.CaptureFixture[str], *, lost
     return said
 
 
-@pytest.mark.parametrize("name", BAD)
+@pytest.mark.parametrize("name", slow_but(QUICK, BAD))
 def test_one_line_says_what_is_wrong_and_nothing_is_written(name: str, tmp_path, capsys) -> None:
     twin, said = BAD[name]
     error = refused(twin, tmp_path, capsys)
@@ -192,7 +214,7 @@ def test_one_line_says_what_is_wrong_and_nothing_is_written(name: str, tmp_path,
 
 
 @pytest.mark.parametrize("twin", [equations(GOOD, start="'displacement_cart'"), mechanism()])
-@pytest.mark.parametrize("n", [40, 500])
+@pytest.mark.parametrize("n", slow_but([40], [40, 500]))
 def test_a_channel_that_begins_too_late_to_tell_a_start_is_one_line(twin: str, n: int, tmp_path, capsys) -> None:
     error = refused(twin, tmp_path, capsys, lost=slice(0, n))
     assert f"displacement_cart: beginning: got {n} lost samples; allowed: at most 6" in error
