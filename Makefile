@@ -27,7 +27,7 @@ FUZZ_SECONDS ?= 600
 TEST_WORKERS ?= 3
 # every recording is read in a fork, and a fork copies a table of all pages: in large ones it takes a third
 LARGE_PAGES = GLIBC_TUNABLES=glibc.malloc.hugetlb=1 PYTHONMALLOC=malloc
-# of random inputs a quarter in `make test`, all in `make test-all`
+# of random inputs a tenth in `make test`, all in `make test-all`
 FEWER = SLOSHLAB_FEWER_EXAMPLES=1
 # a file by one worker, in the order of tests/measured_times.csv
 PYTEST = $(LARGE_PAGES) $(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder

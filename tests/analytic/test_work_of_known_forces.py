@@ -120,7 +120,7 @@ def test_a_spring_alone_seems_to_feed_energy_until_its_stored_energy_is_taken_ou
 
 
 @pytest.mark.parametrize("phase_from", ["acceleration", "velocity", "between"])
-@pytest.mark.parametrize("kind", ["viscous", "cubic", "coulomb"])
+@pytest.mark.parametrize("kind", slow_but(["coulomb"], ["viscous", "cubic", "coulomb"]))
 @pytest.mark.parametrize("channel", ["acceleration", "velocity"])
 def test_work_does_not_depend_on_where_a_cycle_begins(phase_from, kind, channel):
     """Cycles may be counted by another signal, as the shaker's voltage; then other energies are stored."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from quick_figures import figures_not_laid_out
 from short_runs import make_laboratory
 
 
@@ -18,18 +18,7 @@ def laboratory(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def _no_layout(*_: object) -> None:
-    """In place of the search for room for labels."""
-
-
-@pytest.fixture(scope="session", autouse=True)
+@pytest.fixture(scope="module", autouse=True)
 def _figures_are_not_laid_out() -> Iterator[None]:
-    """Where `make test` wants a quick answer, reports draw every mark and word, but lay nothing out.
-
-    To find room for labels takes half the time of a report. Layout is tested in tests/unit/pipelines/report, and
-    by `make test-all` in these reports, too.
-    """
-    with pytest.MonkeyPatch.context() as patches:
-        if os.environ.get("SLOSHLAB_FEWER_EXAMPLES"):
-            patches.setattr("matplotlib.layout_engine.ConstrainedLayoutEngine.execute", _no_layout)
+    with figures_not_laid_out():
         yield

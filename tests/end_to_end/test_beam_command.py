@@ -174,6 +174,7 @@ def test_the_summary_for_machines_is_the_last_line(
         assert not spectra.data_vars
 
 
+@pytest.mark.slow
 def test_same_input_same_bytes(folder: Path, tmp_path: Path) -> None:
     for name in ("first", "second"):
         arguments = ["beam", str(folder / "decay_frozen.nc"), str(folder / "random_sloshing.nc")]

@@ -147,7 +147,7 @@ def test_one_run_alone_is_answered_and_what_it_cannot_decide_is_said(lone: Path,
 
 def test_one_run_alone_names_nothing_and_says_what_cannot_run(tmp_path: Path, capsys: Any) -> None:
     """A spring that hardens, in a single run: something is missing, and no other run can confirm its name."""
-    folder = case(tmp_path / "case", decay(0.018, 1.5, 3e5))
+    folder = case(tmp_path / "case", decay(0.018, 1.1, 3e5))
     (tmp_path / "runaway.py").write_text(RUNAWAY.replace("runaway", "runaway_again"), encoding="utf-8")
     code = run(["diagnose", str(folder), "--effects", str(tmp_path / "runaway.py"), "--no-report"])
     assert code == DONE_BUT_FLAGGED, capsys.readouterr().err

@@ -38,7 +38,7 @@ def arguments_for(laboratory: Path, output: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("place", list(PLACES))
-@pytest.mark.parametrize("nth_call", [1, 2])
+@pytest.mark.parametrize("nth_call", slow_but([1], [1, 2]))
 def test_interrupted_at_a_known_place(
     place, nth_call, laboratory: Path, tmp_path: Path, monkeypatch, capsys
 ) -> None:

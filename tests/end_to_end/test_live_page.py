@@ -250,6 +250,7 @@ def test_a_trigger_by_the_command(bench: Path, lab: Path) -> None:
         np.testing.assert_array_equal(found[name].values, original[name].values[at - 512 :])
 
 
+@pytest.mark.slow
 def test_a_mark_of_the_page_starts_a_recording(bench: Path, lab: Path) -> None:
     """By the messages of the page itself; what came before the mark is there, and time 0 is where it was set."""
     from websockets.sync.client import connect

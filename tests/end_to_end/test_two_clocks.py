@@ -63,6 +63,7 @@ def windows_of(recording: Path, rig: Path, output: Path) -> xr.Dataset:
     return xr.load_dataset(output / "windows.nc")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [16, pytest.param(1, marks=pytest.mark.slow)])
 def test_two_devices_are_one_recording(speed: int, repository: Path, tmp_path: Path) -> None:
     """In real time host arrival times lead; played faster they mean nothing and the signals do it alone."""

@@ -8,5 +8,5 @@ _LEAST = 20
 
 
 def examples(n: int) -> int:
-    """`n`; where `make test` sets ``SLOSHLAB_FEWER_EXAMPLES`` a quarter, but no fewer than 20 unless `n` is."""
-    return max(n // 4, min(n, _LEAST)) if os.environ.get("SLOSHLAB_FEWER_EXAMPLES") else n
+    """`n`; where `make test` sets ``SLOSHLAB_FEWER_EXAMPLES`` a tenth, but no fewer than 20 unless `n` is."""
+    return max(n // 10, min(n, _LEAST)) if os.environ.get("SLOSHLAB_FEWER_EXAMPLES") else n

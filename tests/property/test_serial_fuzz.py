@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from number_of_examples import examples
+from slow_cases import slow_but
 
 from acquisition.samples.delivery import Block, Trouble, TroubleKind
 from acquisition.wire import cobs
@@ -237,7 +238,7 @@ def device_of_huge_shapes() -> bytes:
 
 
 @pytest.mark.parametrize("hostile", [device_that_floods, device_of_short_garbage, device_of_huge_shapes])
-@pytest.mark.parametrize("calibrated", [True, False])
+@pytest.mark.parametrize("calibrated", slow_but([False], [True, False]))
 def test_floods_stay_in_bounded_memory(hostile: Callable[[], bytes], calibrated: bool) -> None:
     decoder = SerialDecoder("serial:test", 60.0)
     if calibrated:

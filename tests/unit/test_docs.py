@@ -15,6 +15,7 @@ import click
 import pytest
 import typer.main
 import yaml
+from quick_figures import figures_not_laid_out
 
 import sloshlab
 from pipelines.command_line import application
@@ -103,8 +104,9 @@ def test_python_examples_run(page: Path, tmp_path: Path, monkeypatch: pytest.Mon
         (tmp_path / name).write_text(content, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {"__name__": "documentation"}
-    for code in blocks:
-        exec(compile(code, str(page), "exec"), names)
+    with figures_not_laid_out():
+        for code in blocks:
+            exec(compile(code, str(page), "exec"), names)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

@@ -73,7 +73,9 @@ def test_the_delay_is_positive_when_the_other_comes_later() -> None:
     assert clock_delay(y, x).delay_s == pytest.approx(-0.01, abs=2e-6)
 
 
-@pytest.mark.parametrize(("noise", "largest_s"), [(0.002, 5e-6), (0.05, 100e-6)])
+@pytest.mark.parametrize(
+    ("noise", "largest_s"), [pytest.param(0.002, 5e-6, marks=pytest.mark.slow), (0.05, 100e-6)]
+)
 def test_the_stated_error_covers_the_truth(noise: float, largest_s: float) -> None:
     covered = 0
     for seed in range(40):

@@ -70,6 +70,7 @@ def test_a_concealed_law_is_found(found, force: Force, formula: str, words: str)
     assert np.sqrt(np.mean((law.force_n(motion) - expected) ** 2)) < 0.05 * expected.std()
 
 
+@pytest.mark.slow
 def test_the_law_is_saved_as_a_twin_that_simulates(found, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
     everything = found(lambda t, x, v: -3e4 * x**2 * v)
     law = found_law(everything, "structure")

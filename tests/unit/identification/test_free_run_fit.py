@@ -178,6 +178,12 @@ HIDDEN: dict[str, tuple[Callable[[], list[CaseRun]], dict[str, float], tuple[str
 LIKE_OTHERS = {
     "structure.mass_error",
     "structure.stiffness_change",
+    "structure.viscous_damping",
+    "structure.quadratic_drag",
+    "structure.constant_force",
+    "sensor.sensor_drift.acceleration_tip",
+    "sensor.sensor_high_pass.acceleration_tip",
+    "sensor.clock_skew.acceleration_tip",
     "structure.asymmetric_friction",
     "tank.viscous_damping",
     "tank.mass_error",

@@ -134,7 +134,9 @@ def test_an_error_of_nothing_is_refused(n_simulated: int, n_initial: int) -> Non
         free_run_error(np.zeros(3), np.zeros(n_simulated), n_initial)
 
 
-@pytest.mark.parametrize(("name", "n_initial"), [("silverbox", 50), ("cascaded_tanks", 50)])
+@pytest.mark.parametrize(
+    ("name", "n_initial"), [("silverbox", 50), pytest.param("cascaded_tanks", 50, marks=pytest.mark.slow)]
+)
 def test_a_free_run_sees_nothing_of_the_outputs_but_the_first_samples(name: str, n_initial: int) -> None:
     rng = np.random.default_rng(5)
     if name == "silverbox":
