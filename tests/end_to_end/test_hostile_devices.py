@@ -65,7 +65,6 @@ def samples(counter: int) -> bytes:
     return frame(SAMPLES, counter % 2**32, counts.tobytes(), 1, 16)
 
 
-A_MILLION = frame(CALIBRATION, 0, b'{"channels": [' + b'{"name": "force_1"},' * 10**6 + b"]}")
 Peer = Callable[[], Iterator[bytes]]
 
 
@@ -95,7 +94,7 @@ def noise_without_zeros() -> Iterator[bytes]:
 
 
 def a_million_channels() -> Iterator[bytes]:
-    yield A_MILLION
+    yield frame(CALIBRATION, 0, b'{"channels": [' + b'{"name": "force_1"},' * 10**6 + b"]}")
     yield from noise_without_zeros()
 
 
