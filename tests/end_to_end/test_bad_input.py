@@ -124,7 +124,34 @@ BAD_RECORDINGS: dict[str, tuple[Edit, tuple[str, ...]]] = {
 }
 
 
-@pytest.mark.parametrize("name", list(BAD_RECORDINGS))
+QUICK_RECORDINGS = (
+    "units are missing",
+    "units of another quantity",
+    "units of time",
+    "quantity is unknown",
+    "jitter",
+    "hidden gap",
+    "time runs backwards",
+    "another sampling rate",
+    "NaN block without flags",
+    "sign of a force cell",
+    "dead force cell",
+    "another format",
+    "run_id is a number",
+    "rate is text",
+    "rate is NaN",
+    "start time is no time",
+    "repeat is a fraction",
+    "unknown experiment",
+    "unknown configuration",
+    "range is text",
+    "scale is infinite",
+    "noise is negative",
+)
+"""Of each attribute and each check of the samples one; tests/unit has all of what a recording may not be."""
+
+
+@pytest.mark.parametrize("name", slow_but(QUICK_RECORDINGS, BAD_RECORDINGS))
 def test_bad_recording_is_refused_in_one_line(name: str, laboratory: Path, tmp_path: Path, capsys: Any) -> None:
     edit, fragments = BAD_RECORDINGS[name]
     bad = edited(laboratory / "sweep_3g.nc", tmp_path / "bad.nc", edit)

@@ -186,6 +186,7 @@ def test_same_input_same_bytes(folder: Path, tmp_path: Path) -> None:
         assert (tmp_path / "first" / name).read_bytes() == (tmp_path / "second" / name).read_bytes()
 
 
+@pytest.mark.slow
 def test_dry_friction_on_the_guide(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """ζ(X) = 2 x_f/(πX); `make sdof` on a folder."""
     beam_runs.make_guide_folder(tmp_path / "guide")

@@ -135,6 +135,7 @@ def flying_wing(repository: Path, tmp_path: Path) -> Path:
     return model
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(find_spec("panelaero") is None, reason="PanelAero is not installed: extra aircraft")
 def test_a_flying_wing_with_a_tank_flutters_as_it_should(
     flying_wing: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -129,6 +129,7 @@ def decrement(values: np.ndarray, n: int) -> float:
     return float(np.log(values[peaks[0]] / values[peaks[n]]) / (2 * np.pi * n))
 
 
+@pytest.mark.slow
 def test_the_viscous_tank_of_appendix_e_adds_c_over_2_m_omega(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "rig.toml").write_text(rig_with("beam", "viscous", "damping_kg_per_s = 3.40"), encoding="utf-8")
     found = simulated(tmp_path / "rig.toml", folder / "beam_free.nc", tmp_path / "sim.nc")
@@ -179,6 +180,7 @@ def test_the_ball_takes_energy_out_and_its_twin_is_saved_and_used_again(
     assert np.abs(balance.values).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_the_same_command_gives_the_same_bytes(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "rig.toml").write_text(rig_with("beam", "viscous", "damping_kg_per_s = 2.0"), encoding="utf-8")
     for name in ("a.nc", "b.nc"):
@@ -407,6 +409,7 @@ def test_a_liquid_in_another_state_than_recorded_is_drawn_and_told_what_to_try(
     assert (tmp_path / "other.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_a_figure_in_the_way_is_not_replaced_unasked(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "sim.png").write_bytes(b"mine")
     words = ["simulate", "--rig", str(folder / "sdof.toml"), "--input", str(folder / "sdof_free.nc"),

@@ -16,6 +16,7 @@ import pytest
 import typer.main
 import yaml
 from quick_figures import figures_not_laid_out
+from slow_cases import slow_but
 
 import sloshlab
 from pipelines.command_line import application
@@ -27,6 +28,8 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 DOCS = REPOSITORY / "docs"
 GENERATED = DOCS / "generated"
 PAGES = sorted(page for page in DOCS.rglob("*.md") if GENERATED not in page.parents)
+QUICK_EXAMPLES = [page for page in PAGES if page.stem != "own_twin_gallery"]
+"""The twins of that page are those of tests/unit/user_twin, too, and take a loop each to compile."""
 OLD_TRIALS = REPOSITORY / "sealed_trial" / "archive" / "trials_1_to_13.tar.xz"
 COMMANDS = typer.main.get_command(application()).commands
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -93,7 +96,7 @@ def test_every_variable_of_the_results_is_documented() -> None:
     assert [name for name in missing if not name.endswith("_std")] == []
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", slow_but(QUICK_EXAMPLES, PAGES), ids=lambda page: page.stem)
 def test_python_examples_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Blocks of one page share their names; files that the page shows under their names are there."""
     text = page.read_text(encoding="utf-8")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from slow_cases import slow_but
 
 from acquisition.virtual_laboratory.numerical_campaign import make_numerical_campaign
 from acquisition.virtual_laboratory.numerical_campaign_tasks import CampaignSettings
@@ -15,6 +16,9 @@ from sloshlab.rig import Rig
 
 RAW_DATA = Path(__file__).parents[4] / "raw_data"
 COMMITTED = RAW_DATA / "numerical_tank"
+
+
+STILL = ("shaker/fill_0.25_frozen_3.00g", "beam/decay_frozen")
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +46,7 @@ def test_raw_data_stays_small_enough_for_a_checkout() -> None:
     assert sum(path.stat().st_size for path in RAW_DATA.rglob("*") if path.is_file()) <= 60e6
 
 
-@pytest.mark.parametrize("run", numerical_runs(), ids=lambda run: run.name)
+@pytest.mark.parametrize("run", slow_but(numerical_runs()[::4], numerical_runs()), ids=lambda run: run.name)
 def test_recording_is_of_the_run_that_its_name_says(run) -> None:
     recording = read_recording(COMMITTED / f"{run.name}.nc")
     assert recording.attrs["run_id"] == Path(run.name).name
@@ -62,12 +66,13 @@ def test_recording_is_of_the_run_that_its_name_says(run) -> None:
             assert np.isfinite(channel.values).all()
 
 
-def test_still_runs_made_again_are_the_committed_ones(tmp_path, manifest) -> None:
+@pytest.mark.parametrize("name", slow_but([STILL[0]], STILL))
+def test_still_runs_made_again_are_the_committed_ones(name, tmp_path, manifest) -> None:
     """A sine of another processor may differ in the last bit, which can turn a rounding."""
     settings = CampaignSettings(
         seed=manifest["seed"], layers_per_height=manifest["layers_per_height"], n_workers=1
     )
-    still = [run for run in numerical_runs() if run.name in {"shaker/fill_0.25_frozen_3.00g", "beam/decay_frozen"}]
+    still = [run for run in numerical_runs() if run.name == name]
     make_numerical_campaign(tmp_path / "again", settings, runs=still)
     for run in still:
         again = read_recording(tmp_path / "again" / f"{run.name}.nc")
