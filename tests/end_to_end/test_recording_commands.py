@@ -191,6 +191,7 @@ def test_a_device_that_dies(bench: Path, lab: Path) -> None:
     assert 400 <= samples_that_agree(bench / "run.nc", lab / "new.nc") < N_SAMPLES
 
 
+@pytest.mark.slow
 def test_ctrl_c_while_a_device_is_away(bench: Path, lab: Path) -> None:
     """By default a recorder waits for a device that has vanished; a person who does not gets what there is."""
     with (
