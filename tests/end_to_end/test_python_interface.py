@@ -284,7 +284,7 @@ def test_a_verdict_in_python_is_that_of_the_command(
 
 
 def test_recordings_of_no_folder_are_a_case_with_their_rig(tmp_path: Path) -> None:
-    folder = case(tmp_path / "case", decay(0.01, 1.5))
+    folder = case(tmp_path / "case", decay(0.01, 1.1))
     of_folder = sl.diagnose(folder)
     in_memory = sl.diagnose(sl.open_campaign(folder / "recordings"), rig=sl.Rig.from_toml(folder / "rig.toml"))
     facts = [json.dumps({**one.facts, "result_id": ""}, sort_keys=True) for one in (of_folder, in_memory)]

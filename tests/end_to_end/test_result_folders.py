@@ -60,7 +60,18 @@ def identifiers(out: Path) -> set[str]:
     return found
 
 
-def test_every_file_carries_one_identifier_and_an_old_report_goes(analyse, tmp_path: Path) -> None:
+def some_figures(monkeypatch: pytest.MonkeyPatch, n_figures: int) -> None:
+    """The first of a report, in place of all."""
+
+    def first_section(experiment: Any) -> list[Any]:
+        [first, *_] = planned_sections(experiment)
+        return [replace(first, figures=first.figures[:n_figures])]
+
+    monkeypatch.setattr(pipelines.sweep.report, "planned_sections", first_section)
+
+
+def test_every_file_carries_one_identifier_and_an_old_report_goes(analyse, tmp_path: Path, monkeypatch) -> None:
+    some_figures(monkeypatch, 6)
     out = tmp_path / "out"
     assert analyse(out, report=True) == 0
     [first] = identifiers(out)
@@ -143,11 +154,7 @@ def test_a_manifest_from_elsewhere_vouches_for_nothing_outside_its_folder(analys
 
 
 def test_results_are_not_written_through_a_link(analyse, tmp_path: Path, monkeypatch, capsys: Any) -> None:
-    def one_figure(experiment: Any) -> list[Any]:
-        [first, *_] = planned_sections(experiment)
-        return [replace(first, figures=first.figures[:1])]
-
-    monkeypatch.setattr(pipelines.sweep.report, "planned_sections", one_figure)
+    some_figures(monkeypatch, 1)
     out, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
     out.mkdir()
     elsewhere.mkdir()

@@ -15,7 +15,7 @@ from pipelines.command_line import run
 
 LEVELS = (1, 3, 5, 7)
 
-pytestmark = pytest.mark.external
+pytestmark = [pytest.mark.external, pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")
