@@ -177,6 +177,7 @@ def test_lost_samples_cost_only_the_cycles_that_they_touch(unbroken_and_broken: 
     assert 1 <= int((12 - touched).sum()) <= 3
 
 
+@pytest.mark.slow
 def test_same_input_same_bytes_in_two_processes(laboratory: Path, tmp_path: Path) -> None:
     runs = [laboratory / name for name in ("sweep_3g.nc", "empty.nc")]
     for name, seed in (("first", "1"), ("second", "77")):
@@ -206,6 +207,7 @@ def test_the_installed_command_refuses_in_one_line(kind: str, laboratory: Path, 
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_a_billion_samples_are_refused_in_little_memory(laboratory: Path, tmp_path: Path) -> None:
     """The process may use 3 GiB; one channel of 10⁹ float64 samples alone would need 8 GB.
 

@@ -94,7 +94,8 @@ def test_interrupt_leaves_earlier_results_alone(laboratory: Path, tmp_path: Path
     assert leftovers(tmp_path) == []
 
 
-@pytest.mark.parametrize("signal_name", slow_but(["SIGINT"], SIGNALS))
+@pytest.mark.slow
+@pytest.mark.parametrize("signal_name", SIGNALS)
 def test_signals_at_many_moments(signal_name: str, laboratory: Path, tmp_path: Path) -> None:
     """Wherever the signal falls, the folder is complete or absent; no moment is assumed to be in any stage."""
     command = [str(Path(sys.executable).with_name("sloshlab"))]

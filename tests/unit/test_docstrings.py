@@ -115,13 +115,15 @@ def n_failed_examples(name: str) -> int:
     module = importlib.import_module(name)
     finder = doctest.DocTestFinder(exclude_empty=True)
     runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS)
-    for test in finder.find(module, name, module=module):
-        runner.run(test)
+    tests = finder.find(module, name, module=module)
     for which, item in public_objects(module):
         # functions compiled by numba are no functions to the finder
         if not inspect.isclass(item) and "." not in which and not inspect.isfunction(vars(module)[which]):
-            for test in finder.find(item, f"{name}.{which}", module=False, globs=vars(module).copy()):
-                runner.run(test)
+            tests += finder.find(item, f"{name}.{which}", module=False, globs=vars(module).copy())
+    for test in tests:
+        # before each docstring a runner looks whether one of all loaded sources has changed
+        if test.examples:
+            runner.run(test)
     return int(runner.summarize(verbose=False).failed)
 
 
