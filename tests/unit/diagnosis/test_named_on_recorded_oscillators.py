@@ -20,6 +20,7 @@ def verdict(folder: Path, runs: Sequence[CaseRun]) -> Verdict:
     return verdict_of(findings_of(Case("case", folder, rig(folder), tuple(runs))))
 
 
+@pytest.mark.slow
 def test_nothing_is_missing_where_nothing_is(tmp_path: Path) -> None:
     found = verdict(tmp_path, decays(LEVELS_M, seed=3))
     assert found.kind == "nothing_missing"
