@@ -167,7 +167,7 @@ rivals: setup  ## other ways to answer the cases of `make trial`, marked alike; 
 	$(BIN)/python -m studies.rivals $(RESULTS)/trial --key $(TRIAL_KEY) --training $(RESULTS)/trial_development \
 	  -o $(RESULTS)/rivals
 
-test: setup  ## the tests, at most 10 minutes on 2 cores
+test: setup  ## the tests, about a quarter of an hour on 2 cores
 	$(FEWER) $(PYTEST) -m "not slow"
 
 test-times: setup  ## the tests, and what each file of them costs into tests/measured_times.csv

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -32,21 +32,31 @@ def retuned_alone(self: ModelSelection, retuned: FreeRunFit) -> list[FreeRunFit]
     return self.known.in_order()
 
 
-@pytest.fixture
-def found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[Force], Findings]:
-    monkeypatch.setattr(findings.ModelSelection, "selected", retuned_alone)
+def damped_with_displacement(t: float, x: float, v: float) -> float:
+    """The force of which several tests ask [N]."""
+    return -3e4 * x**2 * v
 
-    def of(force: Force) -> Findings:
-        runs = decays(LEVELS_M, seed=7, force=force)
-        return findings_of(Case("case", tmp_path, rig(tmp_path), tuple(runs)))
 
-    return of
+@pytest.fixture(name="found", scope="module")
+def _found(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[Force], Findings]]:
+    known: dict[Force, Findings] = {}
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(findings.ModelSelection, "selected", retuned_alone)
+
+        def of(force: Force) -> Findings:
+            if force not in known:
+                folder = tmp_path_factory.mktemp("law")
+                runs = decays(LEVELS_M, seed=7, force=force)
+                known[force] = findings_of(Case("case", folder, rig(folder), tuple(runs)))
+            return known[force]
+
+        yield of
 
 
 @pytest.mark.parametrize(
     ("force", "formula", "words"),
     [
-        (lambda t, x, v: -3e4 * x**2 * v, "x² · v", "a damping that depends on the displacement"),
+        (damped_with_displacement, "x² · v", "a damping that depends on the displacement"),
         pytest.param(lambda t, x, v: -3e8 * x**5, "x⁵", "a nonlinear spring", marks=pytest.mark.slow),
         pytest.param(
             lambda t, x, v: -20 * abs(x) * np.tanh(v / 1e-4),
@@ -70,9 +80,8 @@ def test_a_concealed_law_is_found(found, force: Force, formula: str, words: str)
     assert np.sqrt(np.mean((law.force_n(motion) - expected) ** 2)) < 0.05 * expected.std()
 
 
-@pytest.mark.slow
 def test_the_law_is_saved_as_a_twin_that_simulates(found, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
-    everything = found(lambda t, x, v: -3e4 * x**2 * v)
+    everything = found(damped_with_displacement)
     law = found_law(everything, "structure")
     assert law is not None
     everything.model.save_extended(law.model.values, law.model.fit.candidates, tmp_path / "extended.toml")
@@ -88,7 +97,7 @@ def test_the_law_is_saved_as_a_twin_that_simulates(found, tmp_path: Path) -> Non
 
 @pytest.mark.slow
 def test_the_verdict_says_the_law_also_where_its_place_is_not_located(found) -> None:  # type: ignore[no-untyped-def]
-    everything = found(lambda t, x, v: -3e4 * x**2 * v)
+    everything = found(damped_with_displacement)
     verdict = verdict_of(everything)
     assert (verdict.kind, verdict.block) == ("unknown", "")
     for text in (verdict.headline, verdict.statement):
