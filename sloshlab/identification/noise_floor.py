@@ -102,7 +102,7 @@ def weighted_observations(case: Case, model: DiagnosedModel) -> dict[str, list[O
         name: within_informative_bands(
             [
                 # Judged by the final variance: whether something stands out of the noise depends on all of it.
-                _ignored_where_drive_noise_dominates(observation, of_sensor, noise)
+                _ignored_where_drive_noise_dominates(observation, of_sensor, noise, model.driving(observation.run))
                 for observation, of_sensor in zip(observed, sensors[name], strict=True)
             ]
         )
@@ -169,14 +169,18 @@ def _with_noise_of_drive(
 
 
 def _ignored_where_drive_noise_dominates(
-    observation: Observation, of_sensor: Observation, noise: Mapping[tuple[str, str], FloatArray]
+    observation: Observation,
+    of_sensor: Observation,
+    noise: Mapping[tuple[str, str], FloatArray],
+    driving: Sequence[str],
 ) -> Observation:
     """An observation that is ignored where the noise of drives dominates and nothing stands out of it.
 
     There a simulation shows noise that the recording has not: a fit would lessen it by more damping, less
-    participation, and a frequency beyond the bands that are compared.
+    participation, and a frequency beyond the bands that are compared. All noise of one that drives is that of a
+    drive. Compared with the others it would count, and beside an effect on these, where it drives alone, not.
     """
-    is_noise = (
+    is_noise = (observation.channel in driving) | np.asarray(
         noise.get((observation.run.name, observation.channel), 0.0) > _DOMINANT_NOISE_RATIO * of_sensor.variance
     )
     ignored = is_noise & ~observation.informative

@@ -62,20 +62,34 @@ class ExplainedScatter:
     def renew(self, fit: FreeRunFit) -> bool:
         """Take the noise about a fit from here on, if it may explain what repeats differ by; whether it may.
 
-        It may where an effect has numbers of its own in single runs.
+        Parameters
+        ----------
+        fit : FreeRunFit
+        """
+        if not self._may_explain(fit):
+            return False
+        self.fitting, self.held_out = self._about(fit)
+        return True
+
+    def fitting_about(self, fit: FreeRunFit) -> list[list[Observation]] | None:
+        """Fitted runs with the noise about a fit; None if it cannot explain what repeats differ by.
 
         Parameters
         ----------
         fit : FreeRunFit
         """
+        return self._about(fit)[0] if self._may_explain(fit) else None
+
+    def _may_explain(self, fit: FreeRunFit) -> bool:
+        """Whether an effect has numbers of its own in single runs."""
         own = tuple(f"{candidate.key}." for candidate in fit.candidates)
-        if not own or not any(name.startswith(own) and run_of(name, self._model) for name in fit.values):
-            return False
+        return bool(own) and any(name.startswith(own) and run_of(name, self._model) for name in fit.values)
+
+    def _about(self, fit: FreeRunFit) -> tuple[list[list[Observation]], list[list[Observation]]]:
         everywhere = replace(fit, values=values_of_runs(self._model, self.held_out, fit))
         every = with_explained_scatter(self._model, [*self.fitting, *self.held_out], self._tests, everywhere)
         n = len(self.fitting)
-        self.fitting, self.held_out = every[:n], every[n:]
-        return True
+        return every[:n], every[n:]
 
 
 def with_explained_scatter(

@@ -17,6 +17,7 @@ from sloshlab.diagnosis.inference.thresholds import LAW
 from sloshlab.diagnosis.inference.whitened import whitened
 from sloshlab.diagnosis.selection.explained_scatter import ExplainedScatter
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
+from sloshlab.diagnosis.selection.full_fit import at_its_optimum
 from sloshlab.diagnosis.selection.nested_models import keys_of
 from sloshlab.diagnosis.selection.successive_halving import HOPELESS_COST_RATIO, NO_CHANCE
 from sloshlab.identification.free_run_fit import inflated_cost
@@ -215,6 +216,40 @@ class KnownFits:
             return max(HOPELESS_COST_RATIO * of_best, allowed)
 
         return hopeless_cost
+
+    def is_more_probable(self, fits: Sequence[FreeRunFit], than: FreeRunFit) -> bool:
+        """Whether one of some fits has more evidence than a simpler one, in the noise as it is or each in its own.
+
+        What a model explains of the scatter of repeats is noise beside the simpler one. In the noise about each of
+        the two the logarithms of its standard deviations, which are the same otherwise, belong to the likelihood.
+
+        Parameters
+        ----------
+        fits : sequence of FreeRunFit
+        than : FreeRunFit
+        """
+        sound = [fit for fit in fits if not fit.trouble]
+        if largest_evidence(sound) > largest_evidence([than]):
+            return True
+        return any(self._evidence_about_itself(fit, than) > 0 for fit in sound)
+
+    def _evidence_about_itself(self, fit: FreeRunFit, than: FreeRunFit) -> float:
+        """Logarithm of the evidence of a fit in the noise about it, over that of another in the noise as it is."""
+        quiet = self._quiet
+        about = None if self._scatter is None else self._scatter.fitting_about(fit)
+        if about is None:
+            return -np.inf
+        own = FittedRuns(quiet.model, about, quiet.tests, quiet.effort).problem_of(fit)
+        refitted, other = at_its_optimum(own, fit.values), quiet.problem_of(than)
+        if refitted.trouble:
+            return -np.inf
+        squares = huber_cost(other.residual(other.theta_of(than.values))) - refitted.misfit
+        ratios = [
+            float(np.log(before.variance / after.variance).sum())
+            for run, explained in zip(quiet.runs, about, strict=True)
+            for before, after in zip(run, explained, strict=True)
+        ]
+        return (squares + sum(ratios)) / (2 * TEMPERING) - complexity(refitted) + complexity(than)
 
     def renew_scatter(self, best: FreeRunFit) -> bool:
         """Noise by the scatter of repeats about a fit that may explain some of it; whether it is another now.

@@ -19,7 +19,7 @@ from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
 from sloshlab.diagnosis.selection.forward_growth import ForwardGrowth, Said
 from sloshlab.diagnosis.selection.full_fit import at_its_optimum
 from sloshlab.diagnosis.selection.hidden_effects import hidden_effects
-from sloshlab.diagnosis.selection.known_fits import N_KEPT, KnownFits, largest_evidence
+from sloshlab.diagnosis.selection.known_fits import N_KEPT, KnownFits
 from sloshlab.diagnosis.selection.nested_models import keys_of, own_numbers, reduced, without
 from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.missing_force.latent_force import STRUCTURE, TANK
@@ -251,7 +251,7 @@ class ModelSelection:
             self._swapped_beside.setdefault(keys_of(fit.candidates), set()).update(
                 keys_of(start.candidates) for start in some
             )
-            if largest_evidence([each for each in found if not each.trouble]) <= largest_evidence([fit]):
+            if not self.known.is_more_probable(found, fit):
                 break
             is_more_probable = True
         return is_more_probable

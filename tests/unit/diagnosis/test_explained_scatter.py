@@ -11,7 +11,10 @@ from recorded_oscillators import RATE_HZ, decays, effect, rig, surroundings
 from test_external_force import FORCE_N, PERIOD_S, WIDTH_S, pulses
 
 from sloshlab.diagnosis.selection.explained_scatter import ExplainedScatter
-from sloshlab.identification.free_run_problem import FreeRunFit
+from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
+from sloshlab.diagnosis.selection.known_fits import KnownFits, largest_evidence
+from sloshlab.identification.free_run_fit import fitted, fitted_baseline
+from sloshlab.identification.free_run_problem import TEMPERING, FreeRunFit
 from sloshlab.identification.observations import Observation, observations, with_scatter, with_typical_scatter
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_physics import effects
@@ -26,9 +29,12 @@ STARTS_S = {"first": 0.37, "second": 0.81}
 @pytest.fixture(name="model", scope="module")
 def _model(tmp_path_factory: pytest.TempPathFactory) -> RigModel:
     """Two repeats with the noise of their sensors and a train of pulses that begins at another instant in each."""
-    folder: Path = tmp_path_factory.mktemp("explained")
+    return recorded(tmp_path_factory.mktemp("explained"), has_pulses=True)
+
+
+def recorded(folder: Path, *, has_pulses: bool) -> RigModel:
     runs = [
-        replace(decays((0.01,), 6.0, noise={}, force=pulses(start))[0], name=name)
+        replace(decays((0.01,), 6.0, noise={}, **({"force": pulses(start)} if has_pulses else {}))[0], name=name)
         for name, start in STARTS_S.items()
     ]
     generator = np.random.default_rng(2)
@@ -76,6 +82,33 @@ def test_what_scatters_about_a_model_of_the_pulses_is_the_noise_of_the_sensors(m
             assert float(np.median(inner)) == pytest.approx(expected, rel=0.3)
     tip_before, tip_after = (each[0][0].variance[2:-2, :12].mean() for each in (runs, scatter.fitting))
     assert tip_before > 20.0 * tip_after
+
+
+@pytest.mark.parametrize("are_there", [True, False])
+def test_pulses_are_more_probable_in_the_noise_about_themselves(tmp_path: Path, are_there: bool) -> None:
+    """By logarithms of standard deviations, which this test adds up; only where there are pulses."""
+    model = recorded(tmp_path, has_pulses=are_there)
+    runs, tests = scattered(model), [list(STARTS_S)]
+    scatter = ExplainedScatter(model, runs, [], tests)
+    known = KnownFits(FittedRuns(model, runs, tests), scatter)
+    at_truth = fit_of(model, with_pulses=True)
+    pulses, _ = fitted(known.runs.problem_of(at_truth), at_truth.values)
+    nothing, _ = fitted_baseline(known.runs.problem())
+    # as if the scatter hid them, however much of it they explain
+    nothing = replace(nothing, misfit=0.0, cost=nothing.cost - nothing.misfit)
+    assert largest_evidence([pulses]) < largest_evidence([nothing])
+    assert known.is_more_probable([pulses], nothing) == are_there
+    if are_there:
+        about = scatter.fitting_about(pulses)
+        assert about is not None
+        logarithms = sum(
+            0.5 * float(np.log(before.variance / after.variance).sum())
+            for run, other in zip(runs, about, strict=True)
+            for before, after in zip(run, other, strict=True)
+        )
+        # residuals are as large as their noise before and after; the rest is what the freedom costs, some tens
+        assert known._evidence_about_itself(pulses, nothing) == pytest.approx(logarithms / TEMPERING, rel=0.15)
+        assert logarithms / TEMPERING > 400.0
 
 
 def test_a_run_that_was_not_repeated_scatters_as_the_repeats_do(model: RigModel) -> None:

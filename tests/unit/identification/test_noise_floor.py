@@ -134,15 +134,12 @@ def test_what_is_noise_of_the_drive_alone_counts_for_nothing() -> None:
     [rests] = observations(run, ["acceleration_tip"])
     sensor, place = rests.variance, ("quiet", "acceleration_tip")
 
-    def counts_for_less(observation: Observation, share: float) -> bool:
+    def counts_for_less(observation: Observation, share: float, driving: tuple[str, ...] = ()) -> bool:
         noise = {place: share * sensor}
         noisier = _with_noise_of_drive(observation, noise, ())
         np.testing.assert_allclose(noisier.variance, (1 + share) * sensor)
-        [factor] = np.unique(
-            (_ignored_where_drive_noise_dominates(noisier, observation, noise).variance / noisier.variance).round(
-                6
-            )
-        )
+        weighed = _ignored_where_drive_noise_dominates(noisier, observation, noise, driving)
+        [factor] = np.unique((weighed.variance / noisier.variance).round(6))
         assert factor in (1.0, 100.0)
         return bool(factor > 1.0)
 
@@ -150,7 +147,12 @@ def test_what_is_noise_of_the_drive_alone_counts_for_nothing() -> None:
     assert not counts_for_less(rests, 0.5)
     assert not counts_for_less(replace(rests, spectra=rests.spectra + 10 * np.sqrt(sensor)), 3.0)
     assert not counts_for_less(replace(rests, simulated=np.full(sensor.shape, 10 * np.sqrt(sensor.max()))), 3.0)
-    np.testing.assert_array_equal(_ignored_where_drive_noise_dominates(rests, rests, {}).variance, sensor)
+    np.testing.assert_array_equal(_ignored_where_drive_noise_dominates(rests, rests, {}, ()).variance, sensor)
+    # of what drives all noise is that of a drive, however small what the others add to it
+    assert counts_for_less(rests, 0.0, ("acceleration_tip",))
+    assert not counts_for_less(rests, 0.5, ("acceleration_root",))
+    moving = replace(rests, spectra=rests.spectra + 10 * np.sqrt(sensor))
+    assert not counts_for_less(moving, 0.0, ("acceleration_tip",))
 
 
 def test_slow_displacements_are_known_to_a_few_times_the_noise_of_the_base(tmp_path: Path) -> None:
