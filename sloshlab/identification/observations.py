@@ -372,7 +372,7 @@ def with_typical_scatter(target: Sequence[Observation], sources: Sequence[Observ
             continue
         # A repeated test has other levels at other times, so that its variance cannot be taken over place by
         # place.
-        quiet = np.min([np.median(source.variance, axis=0) for source in alike], axis=0)
+        quiet = _of_quietest(alike, observation.spectra.shape[1])
         shares = [
             source.variance[source.informative].sum() / (source.spectra**2)[source.informative].sum()
             for source in alike
@@ -383,6 +383,15 @@ def with_typical_scatter(target: Sequence[Observation], sources: Sequence[Observ
         local = uniform_filter(observation.spectra**2, SCATTER_AVERAGED_OVER, mode="nearest")
         weighted.append(_weighted(observation, np.maximum(quiet[None, :], share * local)))
     return weighted
+
+
+def _of_quietest(sources: Sequence[Observation], n_kept: int) -> FloatArray:
+    """Least median variance of each band; none of bands that all of them have left out, as nothing stood out."""
+    quiet = np.full(n_kept, np.inf)
+    for source in sources:
+        medians = np.median(source.variance[:, :n_kept], axis=0)
+        quiet[: medians.size] = np.minimum(quiet[: medians.size], medians)
+    return np.where(np.isinf(quiet), 0.0, quiet)
 
 
 def without_scatter(run: Sequence[Observation]) -> list[Observation]:

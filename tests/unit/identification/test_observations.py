@@ -164,6 +164,29 @@ def test_a_channel_that_shows_nothing_has_its_noise_where_no_test_was_repeated_t
     np.testing.assert_allclose(target.variance, 1e6)
 
 
+def test_bands_that_a_repeated_test_has_left_out_are_known_to_their_sensor() -> None:
+    """Tests at other levels keep other bands; those that they have in common are weighted as if all were kept."""
+    [target] = observations(run(TONE, noise=0.02), ["acceleration_tip"])
+    whole, narrow = (
+        replace(each[0], variance=np.full(each[0].spectra.shape, variance))
+        for each, variance in zip(
+            (observations(repeat, ["acceleration_tip"]) for repeat in repeats(2, 0.0)), (9e4, 1e4), strict=True
+        )
+    )
+    n = narrow.spectra.shape[1]
+    narrow = replace(narrow, spectra=narrow.spectra[:, :20], variance=narrow.variance[:, :20], n_transformed=n)
+    [both] = with_typical_scatter([target], [whole, narrow])
+    assert (both.variance[:, :20] == 1e4).all()
+    assert (both.variance[:, 20:] == 9e4).all()
+    [alone] = with_typical_scatter([target], [narrow])
+    assert (alone.variance[:, :20] == 1e4).all()
+    np.testing.assert_array_equal(alone.variance[:, 20:], target.variance[:, 20:])
+    few = replace(target, spectra=target.spectra[:, :12], variance=target.variance[:, :12], n_transformed=n)
+    [kept] = with_typical_scatter([few], [whole])
+    assert kept.variance.shape == few.variance.shape
+    assert (kept.variance == 9e4).all()
+
+
 def test_an_equal_error_in_all_repeats_is_no_scatter() -> None:
     """What the model misses in every repeat alike must stay visible."""
     group = [observations(run(TONE, noise=0.02), ["acceleration_tip"]) for _ in range(3)]
