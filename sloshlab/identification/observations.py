@@ -394,6 +394,33 @@ def _of_quietest(sources: Sequence[Observation], n_kept: int) -> FloatArray:
     return np.where(np.isinf(quiet), 0.0, quiet)
 
 
+def with_scatter_of_residuals(
+    runs: Sequence[Sequence[Observation]], residual: FloatArray
+) -> list[list[Observation]]:
+    """Observations weighted by how large the residuals of one simulation are, run by run.
+
+    Averaged as the scatter of repeats is, and never less than the noise of sensors and drives.
+
+    Parameters
+    ----------
+    runs : sequence of sequences of Observation
+    residual : ndarray
+        Whitened, of all coefficients of these runs in their order.
+    """
+    ends = np.cumsum([observation.spectra.size for run in runs for observation in run])
+    parts = iter(np.split(residual, ends[:-1]))
+
+    def weighted(observation: Observation) -> Observation:
+        squares = next(parts).reshape(observation.spectra.shape) ** 2 * observation.variance
+        least = observation.variance if observation.without_scatter is None else observation.without_scatter
+        variance = np.maximum(uniform_filter(squares, SCATTER_AVERAGED_OVER, mode="nearest"), least)
+        if observation.ignored is not None:
+            variance = np.where(observation.ignored, observation.variance, variance)
+        return replace(observation, variance=variance)
+
+    return [[weighted(observation) for observation in run] for run in runs]
+
+
 def without_scatter(run: Sequence[Observation]) -> list[Observation]:
     """Observations of a run known to the noise of their sensors and drives: what differs from repeat to repeat may
     be physics.

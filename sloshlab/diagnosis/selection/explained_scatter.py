@@ -59,6 +59,16 @@ class ExplainedScatter:
         self._model, self._tests = model, tests
         self.fitting, self.held_out = [list(run) for run in fitting], [list(run) for run in held_out]
 
+    def may_explain(self, fit: FreeRunFit) -> bool:
+        """Whether a fit may explain what repeats differ by: where an effect has numbers of its own in single runs.
+
+        Parameters
+        ----------
+        fit : FreeRunFit
+        """
+        own = tuple(f"{candidate.key}." for candidate in fit.candidates)
+        return bool(own) and any(name.startswith(own) and run_of(name, self._model) for name in fit.values)
+
     def renew(self, fit: FreeRunFit) -> bool:
         """Take the noise about a fit from here on, if it may explain what repeats differ by; whether it may.
 
@@ -66,30 +76,13 @@ class ExplainedScatter:
         ----------
         fit : FreeRunFit
         """
-        if not self._may_explain(fit):
+        if not self.may_explain(fit):
             return False
-        self.fitting, self.held_out = self._about(fit)
-        return True
-
-    def fitting_about(self, fit: FreeRunFit) -> list[list[Observation]] | None:
-        """Fitted runs with the noise about a fit; None if it cannot explain what repeats differ by.
-
-        Parameters
-        ----------
-        fit : FreeRunFit
-        """
-        return self._about(fit)[0] if self._may_explain(fit) else None
-
-    def _may_explain(self, fit: FreeRunFit) -> bool:
-        """Whether an effect has numbers of its own in single runs."""
-        own = tuple(f"{candidate.key}." for candidate in fit.candidates)
-        return bool(own) and any(name.startswith(own) and run_of(name, self._model) for name in fit.values)
-
-    def _about(self, fit: FreeRunFit) -> tuple[list[list[Observation]], list[list[Observation]]]:
         everywhere = replace(fit, values=values_of_runs(self._model, self.held_out, fit))
         every = with_explained_scatter(self._model, [*self.fitting, *self.held_out], self._tests, everywhere)
         n = len(self.fitting)
-        return every[:n], every[n:]
+        self.fitting, self.held_out = every[:n], every[n:]
+        return True
 
 
 def with_explained_scatter(

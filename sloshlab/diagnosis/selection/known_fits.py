@@ -22,6 +22,7 @@ from sloshlab.diagnosis.selection.nested_models import keys_of
 from sloshlab.diagnosis.selection.successive_halving import HOPELESS_COST_RATIO, NO_CHANCE
 from sloshlab.identification.free_run_fit import inflated_cost
 from sloshlab.identification.free_run_problem import TEMPERING, FreeRunFit, huber_cost
+from sloshlab.identification.observations import with_scatter_of_residuals
 
 N_KEPT: Final = 4
 """Models that are fitted to the end at every step of the search; eight times as many are begun, half of them where
@@ -218,10 +219,10 @@ class KnownFits:
         return hopeless_cost
 
     def is_more_probable(self, fits: Sequence[FreeRunFit], than: FreeRunFit) -> bool:
-        """Whether one of some fits has more evidence than a simpler one, in the noise as it is or each in its own.
+        """Whether one of some fits has more evidence than a simpler one.
 
-        What a model explains of the scatter of repeats is noise beside the simpler one. In the noise about each of
-        the two the logarithms of its standard deviations, which are the same otherwise, belong to the likelihood.
+        What a model may explain of the scatter of repeats is noise beside the simpler one, and would gain little:
+        such a model is compared in noise that the residuals of each of the two tell, too.
 
         Parameters
         ----------
@@ -231,25 +232,25 @@ class KnownFits:
         sound = [fit for fit in fits if not fit.trouble]
         if largest_evidence(sound) > largest_evidence([than]):
             return True
-        return any(self._evidence_about_itself(fit, than) > 0 for fit in sound)
+        explaining = [fit for fit in sound if self._scatter is not None and self._scatter.may_explain(fit)]
+        if not explaining:
+            return False
+        return max(map(self._evidence_in_own_noise, explaining)) > self._evidence_in_own_noise(than)
 
-    def _evidence_about_itself(self, fit: FreeRunFit, than: FreeRunFit) -> float:
-        """Logarithm of the evidence of a fit in the noise about it, over that of another in the noise as it is."""
-        quiet = self._quiet
-        about = None if self._scatter is None else self._scatter.fitting_about(fit)
-        if about is None:
-            return -np.inf
-        own = FittedRuns(quiet.model, about, quiet.tests, quiet.effort).problem_of(fit)
-        refitted, other = at_its_optimum(own, fit.values), quiet.problem_of(than)
+    def _evidence_in_own_noise(self, fit: FreeRunFit) -> float:
+        """Logarithm of the evidence of a fit, whose own residuals in the fitted runs tell what scatters there.
+
+        The logarithms of the standard deviations, which other comparisons have in common, belong to it.
+        """
+        problem = self._quiet.problem_of(fit)
+        theta = problem.theta_of(fit.values)
+        of_itself = with_scatter_of_residuals(self._quiet.runs, problem.residual(theta))
+        own = FittedRuns(self._quiet.model, of_itself, self._quiet.tests, self._quiet.effort)
+        refitted = at_its_optimum(own.problem_of(fit), fit.values)
         if refitted.trouble:
             return -np.inf
-        squares = huber_cost(other.residual(other.theta_of(than.values))) - refitted.misfit
-        ratios = [
-            float(np.log(before.variance / after.variance).sum())
-            for run, explained in zip(quiet.runs, about, strict=True)
-            for before, after in zip(run, explained, strict=True)
-        ]
-        return (squares + sum(ratios)) / (2 * TEMPERING) - complexity(refitted) + complexity(than)
+        logarithms = sum(float(np.log(each.variance).sum()) for run in of_itself for each in run)
+        return -(refitted.misfit + logarithms) / (2 * TEMPERING) - complexity(refitted)
 
     def renew_scatter(self, best: FreeRunFit) -> bool:
         """Noise by the scatter of repeats about a fit that may explain some of it; whether it is another now.

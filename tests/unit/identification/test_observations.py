@@ -11,7 +11,13 @@ from recorded_oscillators import NOISE, RATE_HZ, decays, run_of
 
 from sloshlab.identification.case import CaseRun
 from sloshlab.identification.lapped_transform import lapped_spectra
-from sloshlab.identification.observations import Observation, observations, with_scatter, with_typical_scatter
+from sloshlab.identification.observations import (
+    Observation,
+    observations,
+    with_scatter,
+    with_scatter_of_residuals,
+    with_typical_scatter,
+)
 
 N = 3000
 HELD = 16
@@ -185,6 +191,29 @@ def test_bands_that_a_repeated_test_has_left_out_are_known_to_their_sensor() -> 
     [kept] = with_typical_scatter([few], [whole])
     assert kept.variance.shape == few.variance.shape
     assert (kept.variance == 9e4).all()
+
+
+def test_residuals_of_one_run_tell_its_noise_down_to_that_of_the_sensor() -> None:
+    """Of 3 and of 0.1 standard deviations, in noise that was taken for five times that of the sensor."""
+    group = [observations(each, ["acceleration_tip"]) for each in repeats(2, 0.0)]
+    sensor = group[0][0].variance
+    large, small = (replace(each[0], variance=25.0 * sensor, without_scatter=sensor) for each in group)
+    ignored = np.zeros(sensor.shape, bool)
+    ignored[2, 5] = True
+    small = replace(small, ignored=ignored)
+    residual = np.concatenate([np.full(sensor.size, 3.0), np.full(sensor.size, 0.1)])
+    [[of_large], [of_small]] = with_scatter_of_residuals([[large], [small]], residual)
+    np.testing.assert_allclose(of_large.variance, 9.0 * 25.0 * sensor)
+    expected = sensor.copy()
+    expected[2, 5] *= 25.0
+    np.testing.assert_allclose(of_small.variance, expected)
+    # the square of a single one is shared among three blocks and nine bands
+    single = np.zeros(sensor.shape)
+    single[6, 20] = 27.0
+    [[of_single]] = with_scatter_of_residuals([[large]], single.ravel())
+    expected = sensor.copy()
+    expected[5:8, 16:25] *= 27.0 * 25.0
+    np.testing.assert_allclose(of_single.variance, expected)
 
 
 def test_an_equal_error_in_all_repeats_is_no_scatter() -> None:
