@@ -163,6 +163,7 @@ GROUPS: dict[str, Callable[[], dict[str, float]]] = {
     "flutter": lambda: measured("flutter"),
     "flights": lambda: measured("flights"),
     "scaling": lambda: measured("scaling"),
+    "modal": lambda: measured("modal"),
     "formats": lambda: measured("formats"),
     "model": model_figures,
     "tank": lambda: tank_figures(ONE_CORE),

@@ -220,6 +220,13 @@ def scaling() -> dict[str, float]:
     return scaling_figures()
 
 
+def modal() -> dict[str, float]:
+    """Speed and error of modal fits."""
+    from tests.benchmarks.modal_fit import modal_figures
+
+    return modal_figures()
+
+
 def formats() -> dict[str, float]:
     """Speed of reading every format."""
     from tests.benchmarks.file_formats import format_figures
@@ -228,6 +235,6 @@ def formats() -> dict[str, float]:
 
 
 if __name__ == "__main__":
-    measurements = (make, analyse, growth, memory, peer, blas, twin, flutter, flights, scaling, formats)
+    measurements = (make, analyse, growth, memory, peer, blas, twin, flutter, flights, scaling, modal, formats)
     chosen = {measurement.__name__: measurement for measurement in measurements}[sys.argv[1]]
     print(json.dumps(chosen(*sys.argv[2:])))
