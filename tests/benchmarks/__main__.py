@@ -36,6 +36,7 @@ from tests.benchmarks.own_twin import STEPS_LABEL
 from tests.benchmarks.reduced_order_model import MEMORY_LABEL, TIME_LABEL, model_figures
 from tests.benchmarks.reduced_order_model_in_the_twin import LOOP_LABEL
 from tests.benchmarks.scaling import CHANNELS_LABEL, NETWORKS_LABEL, TANKS_LABEL
+from tests.benchmarks.study import STUDY_LABEL, study_figures
 from tests.benchmarks.tanks_in_flight import LABEL as GUST_LABEL
 from tests.benchmarks.twin import FREE_LABEL, LANES_LABEL, METHODS, RANDOM_LABEL, RIVAL_LABEL
 
@@ -76,6 +77,7 @@ AIMS = {
     VIRTUAL_LABEL: 2.0,
     TIME_LABEL: 120.0,
     MEMORY_LABEL: 1.5,
+    STUDY_LABEL: 900.0,
     **{label(layers): aim for layers, aim in RESOLUTIONS.items()},
     **{f"{transport}: samples wrong or lost": 0.0 for transport in TRANSPORTS},
     **{f"{transport}: recorder, share of one core": 0.6 for transport in TRANSPORTS},
@@ -166,6 +168,7 @@ GROUPS: dict[str, Callable[[], dict[str, float]]] = {
     "modal": lambda: measured("modal"),
     "formats": lambda: measured("formats"),
     "model": model_figures,
+    "study": lambda: in_a_folder(study_figures),
     "tank": lambda: tank_figures(ONE_CORE),
     "recording": recording_figures,
     "campaigns": campaign_figures,

@@ -26,6 +26,7 @@ from tests.benchmarks.numerical_tank import label as tank_label
 from tests.benchmarks.reduced_order_model import TIME_LABEL
 from tests.benchmarks.reduced_order_model_in_the_twin import LOOP_LABEL
 from tests.benchmarks.scaling import CHANNELS_LABEL, NETWORKS_LABEL, TANKS_LABEL
+from tests.benchmarks.study import STUDY_LABEL
 from tests.benchmarks.tanks_in_flight import LABEL as GUST_LABEL
 from tests.benchmarks.twin import RIVAL_LABEL
 
@@ -79,6 +80,7 @@ ROWS: Final = (
         "each of 200 000 steps waits for the one before, and the rival's time is the filling of its samples",
     ),
     Row("NFIR 70 × 35 on 480 s [s]", TIME_LABEL, "309"),
+    Row("study of 32 networks [s]", STUDY_LABEL, "3600"),
     Row(
         "10 s of beam and model 60 × 20 [s]",
         LOOP_LABEL,
