@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from forked_programs import programs_as_forks
 
 from tests.compiled_once import compile_once
 from tests.measured_times import sort_by_time
@@ -50,6 +51,13 @@ def _no_figure_is_left() -> Iterator[None]:
     yield
     if "matplotlib.pyplot" in sys.modules:
         sys.modules["matplotlib.pyplot"].close("all")
+
+
+@pytest.fixture(scope="module")
+def programs_are_forks() -> Iterator[None]:
+    """Programs of the project are forks, in `make test`: for tests of what they do, not of how they start."""
+    with programs_as_forks():
+        yield
 
 
 @pytest.fixture(scope="session")

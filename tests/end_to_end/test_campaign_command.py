@@ -20,6 +20,8 @@ from short_runs import DONE_BUT_FLAGGED, INPUT_IS_BAD, USAGE, assert_one_line, c
 
 from pipelines.command_line import run
 
+pytestmark = pytest.mark.usefixtures("programs_are_forks")
+
 REPOSITORY = Path(__file__).resolve().parents[2]
 
 

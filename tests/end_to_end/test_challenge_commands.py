@@ -15,6 +15,8 @@ from progress_lines import without_progress
 from pipelines.command_line import run
 from tests.unit.sealed_trial.hand_made_challenges import TRUTHS, answering, verdict, written_challenge
 
+pytestmark = pytest.mark.usefixtures("programs_are_forks")
+
 REPOSITORY = Path(__file__).resolve().parents[2]
 PAGE = REPOSITORY / "docs" / "challenge.md"
 RIGHT = {

@@ -38,7 +38,10 @@ from short_runs import DONE_BUT_FLAGGED, INPUT_IS_BAD, USAGE, assert_one_line, r
 
 from pipelines.command_line import run
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminals and signals")
+pytestmark = [
+    pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminals and signals"),
+    pytest.mark.usefixtures("programs_are_forks"),
+]
 pytest.importorskip("uvicorn", reason="needs the extra live")
 pytest.importorskip("starlette", reason="needs the extra live")
 pytest.importorskip("websockets", reason="needs the extra live")

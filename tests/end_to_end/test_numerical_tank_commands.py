@@ -20,6 +20,8 @@ from pipelines.command_line import run
 from pipelines.recording import virtual
 from sloshlab.recording import read_recording
 
+pytestmark = pytest.mark.usefixtures("programs_are_forks")
+
 COARSE = ["--liquid", "numerical", "--layers", "8", "--duration-s", "5"]
 
 

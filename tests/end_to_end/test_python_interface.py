@@ -27,6 +27,8 @@ from sloshlab.reduced_order_model.storage import load_model
 MAIN_JOB = """
 import sloshlab as sl
 
+pytestmark = pytest.mark.usefixtures("programs_are_forks")
+
 runs = ["lab/sweep_1.5g.nc", "lab/sweep_3g.nc", "lab/empty.nc"]
 sweep = sl.analyse_sweep(runs, rig="lab/rig.toml")
 print(*sweep.summary, sep="\\n")

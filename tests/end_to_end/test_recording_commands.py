@@ -34,6 +34,8 @@ from short_runs import DONE_BUT_FLAGGED, INPUT_IS_BAD, INTERRUPTED, USAGE, asser
 import pipelines.recording.record
 from pipelines.command_line import run
 
+pytestmark = pytest.mark.usefixtures("programs_are_forks")
+
 resource = pytest.importorskip("resource", reason="needs pseudo-terminals and signals")
 
 N_SAMPLES = 4096

@@ -18,6 +18,8 @@ import pipelines.sweep.report
 from pipelines.command_line import run
 from pipelines.sweep.sections import planned_sections
 
+pytestmark = pytest.mark.usefixtures("programs_are_forks")
+
 DATA = {"windows.nc", "maps.nc", "result.json"}
 
 

@@ -16,7 +16,10 @@ from live_commands import Command, cut_recording, n_bytes, playing, running, sto
 
 from pipelines.command_line import run
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="the logger is ended by SIGINT")
+pytestmark = [
+    pytest.mark.skipif(os.name != "posix", reason="the logger is ended by SIGINT"),
+    pytest.mark.usefixtures("programs_are_forks"),
+]
 
 N_SAMPLES = 2048
 FORCE = {"range_min": -20.0, "range_max": 20.0, "noise_std": 0.01875, "block_from": "shaker", "block_to": "tank"}

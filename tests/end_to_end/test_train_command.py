@@ -21,6 +21,8 @@ from pipelines.liquid_model.study_cases import StudyCase
 from sloshlab.recording import read_recording
 from sloshlab.reduced_order_model.storage import load_model
 
+pytestmark = pytest.mark.usefixtures("programs_are_forks")
+
 DURATION_S = 24.0
 SMALL = ("--delays", "6", "--neurons", "3", "--epochs", "2", "--rate-hz", "170")
 FIGURES = {

@@ -17,7 +17,10 @@ from short_runs import DONE_BUT_FLAGGED, shaker_arguments
 
 from pipelines.command_line import run
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminals")
+pytestmark = [
+    pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminals"),
+    pytest.mark.usefixtures("programs_are_forks"),
+]
 
 DURATION_S = 64.0
 DRIFT_PPM, OFFSET_S = 100.0, 0.05

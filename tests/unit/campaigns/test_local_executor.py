@@ -14,7 +14,10 @@ from campaigns.task import Task
 from campaigns.working import work_through
 from sloshlab.errors import InputError
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals")
+pytestmark = [
+    pytest.mark.skipif(os.name != "posix", reason="signals"),
+    pytest.mark.usefixtures("programs_are_forks"),
+]
 
 PARENT = """
 import sys

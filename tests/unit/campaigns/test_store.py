@@ -21,6 +21,8 @@ from campaigns.store import Store
 from campaigns.stored_task import StoredTask, carried_out
 from sloshlab.errors import InputError
 
+pytestmark = pytest.mark.usefixtures("programs_are_forks")
+
 FUNCTION = "task_functions:doubled"
 
 

@@ -17,6 +17,8 @@ from sealed_trial.sealing.selection import Selection
 from sealed_trial.sealing.trial_folder import READABLE
 from sloshlab.errors import InputError
 
+pytestmark = pytest.mark.usefixtures("programs_are_forks")
+
 FOUR = [truth(f"case_00{k}", "nothing", accepted=[[]]) for k in (1, 2, 3, 4)]
 
 

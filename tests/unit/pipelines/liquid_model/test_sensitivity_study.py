@@ -10,6 +10,8 @@ from sloshlab.reduced_order_model.regressors import Run
 from sloshlab.reduced_order_model.storage import load_model
 from sloshlab.reduced_order_model.training import TrainingSettings
 
+pytestmark = pytest.mark.usefixtures("programs_are_forks")
+
 SETTINGS = TrainingSettings(n_epochs=3)
 CASES = (StudyCase("nfir", 2, 0, 2), StudyCase("nfir", 6, 0, 6), StudyCase("noe", 1, 1, 2))
 
