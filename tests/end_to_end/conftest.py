@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from quick_figures import figures_not_laid_out
+from quick_figures import figures_not_drawn
 from short_runs import make_laboratory
 
 
@@ -19,6 +19,6 @@ def laboratory(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _figures_are_not_laid_out() -> Iterator[None]:
-    with figures_not_laid_out():
+def _figures_are_not_drawn() -> Iterator[None]:
+    with figures_not_drawn():
         yield
