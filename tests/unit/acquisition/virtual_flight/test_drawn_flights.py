@@ -19,12 +19,14 @@ from pipelines.diagnosis.challenge_truths import known_vocabulary, marked_truth
 from sealed_trial.challenge.stated_truth import stated_truth
 
 WING = read_wing(Path(__file__).parents[4] / "docs/examples/flight_wing.toml")
+SEED = 1
+"""One of those whose effects are found in a few tries; others take up to ten times as many."""
 
 
 @pytest.fixture(scope="module")
 def flights() -> list[Flight]:
     """One that hides nothing, one with an effect, one look-alike."""
-    drawing = FlightDrawing(WING, 3)
+    drawing = FlightDrawing(WING, SEED)
     draws = {"nothing": (), "effects": SINGLES[:1], "look_alikes": LOOK_ALIKES}
     return [drawing._flight(number, kind, draws[kind]) for number, kind in enumerate(draws)]
 
@@ -51,10 +53,10 @@ def test_strengths_are_those_of_the_case(flights: list[Flight]) -> None:
 
 def test_the_same_seed_draws_the_same_and_another_another(flights: list[Flight]) -> None:
     first = flights[1]
-    again = FlightDrawing(WING, 3)._flight(1, "effects", SINGLES[:1])
+    again = FlightDrawing(WING, SEED)._flight(1, "effects", SINGLES[:1])
     assert first.truth["effects"]
     assert (first.truth, first.laboratory, first.card) == (again.truth, again.laboratory, again.card)
-    other = FlightDrawing(WING, 4)._flight(0, "nothing", [])
+    other = FlightDrawing(WING, SEED + 1)._flight(0, "nothing", [])
     assert other.laboratory != flights[0].laboratory
 
 
