@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -67,6 +68,22 @@ def motion(
     base: Callable[[float], float] | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Time, displacement, velocity and acceleration relative to the base; friction from reversal to reversal."""
+    known = _motion(start_m, duration_s, force, mass_kg, damping, friction_n, base)
+    time, x, v, a = (values.copy() for values in known)
+    return time, x, v, a
+
+
+@functools.cache
+def _motion(
+    start_m: float,
+    duration_s: float,
+    force: Force,
+    mass_kg: float,
+    damping: float,
+    friction_n: tuple[float, float],
+    base: Callable[[float], float] | None,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The same, integrated once: many tests begin with the same decays."""
     time = np.arange(round(duration_s * RATE_HZ)) / RATE_HZ
     x, v, a = (np.zeros(time.size) for _ in range(3))
 
@@ -102,8 +119,9 @@ def motion(
             max_step=0.01,
         )
         inside = (time >= at) & (time <= found.t[-1])
+        if inside.any():
+            x[inside], v[inside] = found.sol(time[inside])
         for i in np.flatnonzero(inside):
-            x[i], v[i] = found.sol(time[i])
             a[i] = rates(time[i], np.array([x[i], v[i]]))[1]
         state, at = found.y[:, -1] * [1.0, 0.0 if found.status == 1 else 1.0], float(found.t[-1])
     return time, x, v, a

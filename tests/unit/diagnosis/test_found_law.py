@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from recorded_oscillators import decays, rig
 
 from sloshlab.diagnosis import findings
 from sloshlab.diagnosis.findings import Findings, findings_of
-from sloshlab.diagnosis.found_law import found_law
+from sloshlab.diagnosis.found_law import FoundLaw, found_law
 from sloshlab.diagnosis.selection.model_selection import ModelSelection
 from sloshlab.diagnosis.verdict import verdict_facts, verdict_of
 from sloshlab.identification.case import Case
@@ -53,6 +54,12 @@ def _found(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[Force
         yield of
 
 
+@pytest.fixture(name="law_of", scope="module")
+def _law_of(found: Callable[[Force], Findings]) -> Callable[[Force], FoundLaw | None]:
+    """The law of a structure, looked for once."""
+    return functools.cache(lambda force: found_law(found(force), "structure"))
+
+
 @pytest.mark.parametrize(
     ("force", "formula", "words"),
     [
@@ -66,9 +73,8 @@ def _found(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[Force
         ),
     ],
 )
-def test_a_concealed_law_is_found(found, force: Force, formula: str, words: str) -> None:  # type: ignore[no-untyped-def]
-    everything = found(force)
-    law = found_law(everything, "structure")
+def test_a_concealed_law_is_found(found, law_of, force: Force, formula: str, words: str) -> None:  # type: ignore[no-untyped-def]
+    everything, law = found(force), law_of(force)
     assert law is not None
     assert law.formula.split(" · ", 1)[1].endswith(formula)
     assert law.words == words
@@ -80,9 +86,8 @@ def test_a_concealed_law_is_found(found, force: Force, formula: str, words: str)
     assert np.sqrt(np.mean((law.force_n(motion) - expected) ** 2)) < 0.05 * expected.std()
 
 
-def test_the_law_is_saved_as_a_twin_that_simulates(found, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
-    everything = found(damped_with_displacement)
-    law = found_law(everything, "structure")
+def test_the_law_is_saved_as_a_twin_that_simulates(found, law_of, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    everything, law = found(damped_with_displacement), law_of(damped_with_displacement)
     assert law is not None
     everything.model.save_extended(law.model.values, law.model.fit.candidates, tmp_path / "extended.toml")
     twin = load_twin(tmp_path / "extended.toml")
