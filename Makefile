@@ -27,10 +27,12 @@ FUZZ_SECONDS ?= 600
 TEST_WORKERS ?= 3
 # every recording is read in a fork, and a fork copies a table of all pages: in large ones it takes a third
 LARGE_PAGES = GLIBC_TUNABLES=glibc.malloc.hugetlb=1 PYTHONMALLOC=malloc
+# there are more workers than cores: threads of one only wait for those of another
+ONE_THREAD = OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 # of random inputs a tenth in `make test`, all in `make test-all`
 FEWER = SLOSHLAB_FEWER_EXAMPLES=1
 # a file by one worker, in the order of tests/measured_times.csv
-PYTEST = $(LARGE_PAGES) $(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder
+PYTEST = $(LARGE_PAGES) $(ONE_THREAD) $(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder
 BENCH ?=
 VERSION = $(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' sloshlab/_version.py)
 DOCS_BRANCH ?= gh-pages
