@@ -20,6 +20,8 @@ from sloshlab.errors import InputError
 from sloshlab.recording import read_recording
 from sloshlab.rig import Rig
 
+pytestmark = pytest.mark.usefixtures("programs_are_forks")
+
 RIG = "shaker/rig_fill_0.50.toml"
 SWEEP = {"experiment": "shaker_sweep", "configuration": "sloshing", "duration_s": 5.0}
 SHORT = [
