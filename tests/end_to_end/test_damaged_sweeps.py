@@ -63,6 +63,12 @@ def case():
     return Case(*cut, 0.61, 0.5)
 
 
+@pytest.fixture(scope="module")
+def clean(case, tmp_path_factory):
+    """The undamaged sweep, analysed once."""
+    return analysed(case, tmp_path_factory.mktemp("clean"), allow_incomplete=True)
+
+
 def said(case, folder):
     """Flags of the analysis, or the refusal."""
     from sloshlab.errors import InputError
@@ -74,9 +80,9 @@ def said(case, folder):
 
 
 @pytest.mark.parametrize("alone", [False, True])
-def test_the_undamaged_sweep_is_not_flagged(case, tmp_path, alone):
+def test_the_undamaged_sweep_is_not_flagged(case, clean, tmp_path, alone):
     # its last cycles are cut by the end of the two minutes
-    flags = said(case.alone() if alone else case, tmp_path)
+    flags = said(case.alone(), tmp_path) if alone else clean.all_flags
     assert [flag for flag in flags if "sweep stops" not in flag] == []
 
 
@@ -89,9 +95,8 @@ def test_a_damage_is_flagged_or_refused(case, tmp_path, damage):
     assert said(damaged, tmp_path)
 
 
-def test_what_was_not_measured_is_left_out(case, tmp_path):
+def test_what_was_not_measured_is_left_out(case, clean, tmp_path):
     """Spikes, a stuck cell and a filled gap cost their cycles: the others keep their W̄."""
-    clean = analysed(case, tmp_path, allow_incomplete=True).windows
     for name, size in (
         ("a cell stuck", 2.0),
         ("spikes in one cell", 40.0),
@@ -99,7 +104,7 @@ def test_what_was_not_measured_is_left_out(case, tmp_path):
     ):
         damaged = DAMAGE[name].apply(case, size, np.random.default_rng(2))
         windows = analysed(damaged, tmp_path, allow_incomplete=True).windows
-        there = np.interp(windows["time_s"], clean["time_s"], clean["w_bar"])
+        there = np.interp(windows["time_s"], clean.windows["time_s"], clean.windows["w_bar"])
         error = np.abs(windows["w_bar"] - there)
         # of what is left, only the scatter of the cycles that are missing
         assert float(np.max(error / (windows["w_bar_std"] + 0.02))) < 5, name

@@ -15,7 +15,7 @@ import click
 import pytest
 import typer.main
 import yaml
-from quick_figures import figures_not_laid_out
+from quick_figures import figures_not_drawn
 from slow_cases import slow_but
 
 import sloshlab
@@ -107,7 +107,7 @@ def test_python_examples_run(page: Path, tmp_path: Path, monkeypatch: pytest.Mon
         (tmp_path / name).write_text(content, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {"__name__": "documentation"}
-    with figures_not_laid_out():
+    with figures_not_drawn():
         for code in blocks:
             exec(compile(code, str(page), "exec"), names)
 
