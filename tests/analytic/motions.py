@@ -6,6 +6,7 @@ derivatives are exact, so that nothing here is integrated or differentiated nume
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,8 +44,9 @@ def motion(knots_s, frequency_hz, acceleration_m_per_s2, *, sampling_rate_hz=200
     )  # fmt: skip
 
 
+@functools.lru_cache(maxsize=8)
 def sweep(law: str, *, duration_s=120.0, low_hz=5.0, high_hz=20.0, acceleration_m_per_s2=15.0, rate_hz=2000.0):
-    """One of the laws that a laboratory drives: octave or linear, up or down, stepped, vfa."""
+    """One of the laws that a laboratory drives, made once for many tests: octave, linear, stepped or vfa."""
     knots = np.linspace(0.0, duration_s, 241)
     share = knots / duration_s
     spline = CubicSpline
@@ -66,7 +68,11 @@ def sweep(law: str, *, duration_s=120.0, low_hz=5.0, high_hz=20.0, acceleration_
         level = acceleration_m_per_s2 * (1 + 0.6 * np.sin(2 * np.pi * 7 * share))
     else:
         raise ValueError(law)
-    return motion(knots, frequency, level, sampling_rate_hz=rate_hz, spline=spline)
+    made = motion(knots, frequency, level, sampling_rate_hz=rate_hz, spline=spline)
+    for values in vars(made).values():
+        if isinstance(values, np.ndarray):
+            values.flags.writeable = False
+    return made
 
 
 LAWS = ("octave_up", "octave_down", "linear_up", "linear_down", "stepped", "vfa")

@@ -46,3 +46,5 @@ def _blank(canvas: FigureCanvasAgg) -> None:
     """In place of drawing: an image of the size of the figure."""
     canvas.renderer = canvas.get_renderer()
     canvas.renderer.clear()
+    if "draw" in vars(canvas.figure):  # what asks for the renderer by a draw of its own
+        canvas.figure.draw(canvas.renderer)
