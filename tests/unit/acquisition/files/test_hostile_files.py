@@ -120,6 +120,7 @@ class TestSizes:
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr("acquisition.files.reading_limits._COMPUTING_S", 0.5)
+        monkeypatch.setattr("acquisition.files.reading_limits._COMPUTING_S_PER_MIB", 0.0)
         blf_file(tmp_path / "run.blf", n_frames=3_000_000)
         with pytest.raises(FileFormatError, match=r"run\.blf: got more than the \d+ s of computing"):
             describe_source(tmp_path / "run.blf")
