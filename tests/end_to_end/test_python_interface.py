@@ -24,10 +24,10 @@ from acquisition.virtual_laboratory.shaker_run import write_virtual_run
 from pipelines.command_line import run
 from sloshlab.reduced_order_model.storage import load_model
 
+pytestmark = pytest.mark.usefixtures("programs_are_forks")
+
 MAIN_JOB = """
 import sloshlab as sl
-
-pytestmark = pytest.mark.usefixtures("programs_are_forks")
 
 runs = ["lab/sweep_1.5g.nc", "lab/sweep_3g.nc", "lab/empty.nc"]
 sweep = sl.analyse_sweep(runs, rig="lab/rig.toml")
