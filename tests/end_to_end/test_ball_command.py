@@ -85,8 +85,6 @@ def test_files_of_a_decay(
 ) -> None:
     whole = decay_stages._response  # half of the time, and no file of the results is about it alone
     monkeypatch.setattr(decay_stages, "_response", lambda ball, rig, n_map: whole(ball, rig, n_map // 5))
-    # the ends of intervals, which are looked at in tests/unit/bouncing_ball, are most of the rest
-    monkeypatch.setattr("sloshlab.bouncing_ball.identification._PROFILE_TOLERANCE", 1.0)
     recording = write_decay(tmp_path / "decay.nc", *ball_decay(1.0))
     out = tmp_path / "out"
     code = run(
