@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -155,9 +155,9 @@ def evaluate_cycles(
     # quadratic.
     slope = np.gradient(np.arange(positions.size, dtype=np.float64), positions, edge_order=2)
     signals = _Signals(
-        force,
-        motion,
-        np.zeros(0, dtype=np.bool_) if unusable is None else unusable,
+        _read_only(force),
+        _read_only(motion),
+        _read_only(np.zeros(0, dtype=np.bool_) if unusable is None else unusable),
         1.0 / sampling_rate_hz,
         inertia_kg,
         motion_is_velocity,
@@ -169,7 +169,7 @@ def evaluate_cycles(
         _kernel(signals, positions, slope, inside & long_enough, part.start, part.stop, scalars, phasors)
         # of a shorter cycle than before, some samples are touched again
         touched = slice(max(int(positions[part.start]) - 8, 0), max(int(positions[part.stop]), 0))
-        for array in (force, motion, signals.unusable):
+        for array in (signals.force, signals.motion, signals.unusable):
             release(array[touched])
     return Cycles(
         start_s=np.asarray(boundaries_s[:-1]),
@@ -188,6 +188,17 @@ def evaluate_cycles(
         inertia_kg=inertia_kg,
         velocity_is_measured=motion_is_velocity,
     )
+
+
+def _read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """The same samples as an array that cannot be written to.
+
+    Numba compiles a loop for each of the two kinds of array, and each may round its sums differently: the same
+    samples would have another last digit in a recording that is mapped from its file.
+    """
+    view = array.view()
+    view.flags.writeable = False
+    return view
 
 
 class _Signals(NamedTuple):
