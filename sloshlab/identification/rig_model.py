@@ -44,6 +44,7 @@ from sloshlab.twin.simulated_channels import ORDER_OF_DERIVATIVE, channel_weight
 from sloshlab.twin.simulation import Simulation
 from sloshlab.twin.storage import save_twin
 from sloshlab.twin.structure_forces import MASS_ERROR
+from sloshlab.twin.terms import Term
 from sloshlab.twin.twin import Twin
 
 FloatArray = NDArray[np.float64]
@@ -58,6 +59,8 @@ _FINER_FOR_EVENTS: Final = 2.0
 """Factor where there are events: within longer steps friction may stop twice, and a contact open and close."""
 _STEPS_PER_FIRST_PERIOD: Final = 60.0
 """Of the lowest mode: forces with memory need them."""
+MOST_STEPS_OF_MEMORY: Final = 64
+"""Per sample; a loop that yields within a 64th of the way between two samples is dry friction to a recording."""
 _LEAST_STEPS_PER_S: Final = 500.0
 """Of a tank that follows its measured motion: forces with a running mean need some tens of steps per cycle.
 
@@ -132,6 +135,7 @@ class RigModel:
         self._drives: dict[tuple[Any, ...], Drive] = {}
         self._truths: OrderedDict[tuple[Any, ...], _Truth] = OrderedDict()
         self._kept_bytes = 0
+        self._speeds_m_per_s: dict[str, float] = {}
         self._lock = threading.Lock()
         self._channels = {run.name: self._channels_of(run) for run in self.runs}
         n_modes = 0 if self.twin.structure is None else self.twin.structure.masses_kg.size
@@ -373,7 +377,17 @@ class RigModel:
             while self._kept_bytes > self._most_kept_bytes and len(self._truths) > 1:
                 self._kept_bytes -= self._truths.popitem(last=False)[1].n_bytes
 
-    def _lane(self, request: Request) -> Lane:
+    def _speed_m_per_s(self, run: CaseRun, twin: Twin) -> float:
+        """The largest of the tank as it is believed, for twins whose memories forget with the way."""
+        if not any(term.memory_rate(1.0) for term in twin.terms):
+            return 0.0
+        if run.name not in self._speeds_m_per_s:
+            lane = self._lane(Request(run, self.believed, NOTHING), speed_m_per_s=0.0)
+            believed = simulated(lane.twin, lane.excitation, lane.start, lane.n_substeps)
+            self._speeds_m_per_s[run.name] = float(np.abs(believed.places[:, 1, 1]).max())
+        return self._speeds_m_per_s[run.name]
+
+    def _lane(self, request: Request, speed_m_per_s: float | None = None) -> Lane:
         run, values = request.run, request.values
         undone = self._undone(request)
         drive = self._drive(run, undone, request.extension.drives)
@@ -392,7 +406,8 @@ class RigModel:
         per_period = _STEPS_PER_PERIOD_OF_A_RELEASE if run.is_free else STEPS_PER_PERIOD
         if any(term.kind.dry_friction or term.kind.events for term in twin.terms):
             per_period *= _FINER_FOR_EVENTS
-        n_substeps = steps_per_sample(twin, rate, per_period)
+        speed = self._speed_m_per_s(run, twin) if speed_m_per_s is None else speed_m_per_s
+        n_substeps = steps_per_sample(twin, rate, per_period, speed)
         if twin.structure is not None:
             # Stiffness and damping for which the integrator's step moves each mode exactly: with them half as many
             # steps are enough.
@@ -486,13 +501,45 @@ def _relative_share(name: str, truth: Mapping[str, FloatArray], values: Mapping[
     return n * (shares[cells.index(name)] if name != cells[-1] else 1.0 - sum(shares))
 
 
-def steps_per_sample(twin: Twin, sampling_rate_hz: float, per_period: float = STEPS_PER_PERIOD) -> int:
-    """Integration steps that follow every mode within the band of a recording, and forces with memory."""
+def steps_per_sample(
+    twin: Twin,
+    sampling_rate_hz: float,
+    per_period: float = STEPS_PER_PERIOD,
+    speed_m_per_s: float = 0.0,
+) -> int:
+    """Integration steps that follow every mode within the band of a recording, and forces with memory.
+
+    Parameters
+    ----------
+    twin : Twin
+    sampling_rate_hz : float
+    per_period : float, optional
+        Of the highest mode.
+    speed_m_per_s : float, optional
+        The largest of the place where forces act, for memories that forget with the way.
+    """
+    least = steps_of_memory(twin.terms, sampling_rate_hz, speed_m_per_s)
     if twin.structure is None:
-        return math.ceil(_LEAST_STEPS_PER_S / sampling_rate_hz)
+        return max(least, math.ceil(_LEAST_STEPS_PER_S / sampling_rate_hz))
     frequencies = twin.structure.frequencies_hz
     needed = max(per_period * float(frequencies.max()), _STEPS_PER_FIRST_PERIOD * float(frequencies.min()))
-    return max(1, min(1000, math.ceil(needed / sampling_rate_hz)))
+    return max(least, min(1000, math.ceil(needed / sampling_rate_hz)))
+
+
+def steps_of_memory(terms: Sequence[Term], sampling_rate_hz: float, speed_m_per_s: float) -> int:
+    """Steps that follow memories which forget with the way; one where there are none.
+
+    A power of two, so that twins that differ a little are simulated side by side.
+
+    Parameters
+    ----------
+    terms : sequence of Term
+    sampling_rate_hz : float
+    speed_m_per_s : float
+        The largest of their place.
+    """
+    needed = max((term.memory_rate(speed_m_per_s) for term in terms), default=0.0) / sampling_rate_hz
+    return int(2 ** math.ceil(math.log2(min(max(needed, 1.0), MOST_STEPS_OF_MEMORY))))
 
 
 def corrected(run: CaseRun, undone: Sequence[SensorFault], driving: Sequence[str]) -> xr.Dataset:

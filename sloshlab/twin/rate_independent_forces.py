@@ -6,6 +6,7 @@ engine finds these instants, so that no step looks across them. Relaxing springs
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import pi
 from typing import Final
 
@@ -105,6 +106,20 @@ LINEAR_STRUCTURAL_DAMPING = register(
 What relaxes slower than the motion creeps: after a release the rest position moves for a while.
 """
 
+
+def _rate_of_yielding(parameters: Mapping[str, float], speed_m_per_s: float) -> float:
+    """|v| ν α/z_y, z_y = (α/(βγ + βδ))^(1/ν): how fast a loop comes to the force at which it yields.
+
+    Unloading may be steeper, but begins where the velocity turns.
+    """
+    stiffness, exponent = parameters["stiffness_n_per_m"], parameters["exponent"]
+    closing = parameters["beta_gamma"] + parameters["beta_delta"]
+    if stiffness <= 0.0 or closing <= 0.0:
+        return 0.0
+    limit: float = (stiffness / closing) ** (1.0 / exponent)
+    return speed_m_per_s * exponent * stiffness / limit
+
+
 HYSTERESIS = register(
     ForceKind(
         "hysteresis",
@@ -119,6 +134,7 @@ HYSTERESIS = register(
         events=_bouc_wen_events,
         n_switches=2,
         memory=lambda values, table: (0.0,),
+        memory_rate=_rate_of_yielding,
         equation="−z, ż = α v − βγ |v| |z|^(ν−1) z − βδ v |z|^ν (Bouc–Wen)",
     )
 )

@@ -54,6 +54,11 @@ def _no_mass(parameters: Mapping[str, float]) -> float:
     return 0.0
 
 
+def _no_rate(parameters: Mapping[str, float], speed_m_per_s: float) -> float:
+    """Has no memory, or one that follows at any step."""
+    return 0.0
+
+
 def _no_memory(parameters: Mapping[str, float], table: FloatArray) -> tuple[float, ...]:
     """Has no states."""
     return ()
@@ -92,6 +97,9 @@ class ForceKind:
         `update` to write and the law to read. Unlike `memory` they are no states, and cost no integration.
     memory : callable
         (parameters, table) → states at the start.
+    memory_rate : callable
+        (parameters, largest speed of its place [m/s]) → fastest rate [1/s] at which its memory forgets, which
+        steps have to follow.
     mass : callable
         Parameters → mass [kg] that the force adds at its place (force −m a), may be negative. It is part of the
         mass matrix, and the law leaves it out.
@@ -121,6 +129,7 @@ class ForceKind:
     update_rate: Callable[[Mapping[str, float]], float] | None = None
     workspace: Callable[[Mapping[str, float], FloatArray], int] = _no_workspace
     memory: Callable[[Mapping[str, float], FloatArray], tuple[float, ...]] = _no_memory
+    memory_rate: Callable[[Mapping[str, float], float], float] = _no_rate
     mass: Callable[[Mapping[str, float]], float] = _no_mass
     uses_acceleration: bool = False
     dry_friction: bool = False
@@ -192,6 +201,10 @@ class Term:
     def mass_kg(self) -> float:
         """Mass that it adds at its place [kg]."""
         return self.kind.mass(self.values)
+
+    def memory_rate(self, speed_m_per_s: float) -> float:
+        """Fastest rate at which its memory forgets [1/s], at the largest speed of its place."""
+        return self.kind.memory_rate(self.values, speed_m_per_s)
 
     @property
     def numbers(self) -> FloatArray:

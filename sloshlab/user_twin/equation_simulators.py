@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import splev, splrep
 
 from sloshlab.errors import AnalysisError, InputError
-from sloshlab.identification.rig_model import steps_per_sample
+from sloshlab.identification.rig_model import steps_of_memory, steps_per_sample
 from sloshlab.twin.excitation import free, recorded, recorded_for_equations
 from sloshlab.twin.lane_preparation import Lane
 from sloshlab.twin.motion import Motion
@@ -63,20 +63,21 @@ class EquationSimulator(SimulatorOneByOne):
         self._n_substeps: dict[str, int] = {}
         self._lock = threading.Lock()
 
-    def truth(self, run: TwinRun, own: Mapping[str, float], terms: Sequence[Term]) -> Truth:
+    def truth(self, asked: Asked) -> Truth:
         """See `SimulatorOneByOne.truth`."""
+        run, own, terms, speed = asked
         with self._lock:
             n_substeps = self._n_substeps.get(run.name, 0)
         if not n_substeps:
             n_substeps = self._steps_per_sample(run, own)
             with self._lock:
                 self._n_substeps[run.name] = n_substeps
-        return self._truth(run, own, terms, n_substeps)
+        return self._truth(run, own, terms, max(n_substeps, steps_of_memory(terms, run.sampling_rate_hz, speed)))
 
     def stand_in(self, run: TwinRun, own: Mapping[str, float]) -> Twin:
         """See `Simulator`."""
         mass = self.moving_mass_kg(run, own)
-        displacement, velocity, acceleration = self.truth(run, own, ())[1].std(axis=0)
+        displacement, velocity, acceleration = self.truth(Asked(run, own, ()))[1].std(axis=0)
         # Of a harmonic motion the spring that would make it; of a state of the first order what its rate asks for.
         turning = acceleration if acceleration > 0 else velocity
         return Twin(single_degree_of_freedom(mass, mass * max(float(turning / max(displacement, 1e-300)), 1e-12)))
@@ -176,10 +177,11 @@ class PrescribedMotionSimulator(SimulatorInLanes[FloatArray]):
         excitation = self._excitations.of(lambda: recorded(rate, **series), rate, series)
         # on what moves absolutely, with steps as small as forces with memory need
         twin = Twin(None, tuple(replace(term, place="tank") for term in asked.terms))
-        return Lane(twin, excitation, n_substeps=steps_per_sample(twin, rate)), prescribed
+        n_substeps = steps_per_sample(twin, rate, speed_m_per_s=asked.speed_m_per_s)
+        return Lane(twin, excitation, n_substeps=n_substeps), prescribed
 
     def _read(self, asked: Asked, needed: FloatArray, motion: Motion | None) -> Truth:
-        run, own, _ = asked
+        run, own = asked.run, asked.own
         forces = np.zeros(run.n_samples) if motion is None else motion.tank_force_n
         readings = self._answers(run, own, needed, forces)
         truth = {name: readings[:, k] for k, name in enumerate(self._twin.compared) if name in run.channels}
@@ -236,8 +238,9 @@ class PrescribedMotionSimulator(SimulatorInLanes[FloatArray]):
         variance = (float(np.median(np.abs(difference))) / _MEDIAN_OF_NOISE) ** 2 / comb(
             2 * _DIFFERENCE, _DIFFERENCE
         )
-        # quiet: where a smoothing as small as that is not reached, the spline is nearly that of all samples
-        spline = splrep(run.time_s, series, k=5, s=series.size * variance, quiet=1)
+        # Where a smoothing as small as that is not reached, the spline is nearly that of all samples; asked for
+        # its whole output, the function says so there instead of warning.
+        spline, *_ = splrep(run.time_s, series, k=5, s=series.size * variance, full_output=1, quiet=1)
         derivatives = [splev(run.time_s, spline, order) for order in (1, 2)]
         motion = np.stack([series, *derivatives], axis=-1)
         with self._lock:

@@ -35,9 +35,10 @@ class MechanismSimulator(SimulatorInLanes[tuple[EngineTwin, Mechanism]]):
         self._lock = threading.Lock()
 
     def _lane(self, asked: Asked) -> tuple[Lane, tuple[EngineTwin, Mechanism]]:
-        ready, mechanism = self._ready(*asked)
+        ready, mechanism = self._ready(asked.run, asked.own, asked.terms)
         start = (mechanism.initial_displacement_m, mechanism.initial_velocity_m_per_s)
-        n_substeps = steps_per_sample(ready.twin, asked.run.sampling_rate_hz)
+        rate, speed = asked.run.sampling_rate_hz, asked.speed_m_per_s
+        n_substeps = steps_per_sample(ready.twin, rate, speed_m_per_s=speed)
         return Lane(ready.twin, self._excitation(ready, asked.run), start, n_substeps), (ready, mechanism)
 
     def _read(self, asked: Asked, needed: tuple[EngineTwin, Mechanism], motion: Motion | None) -> Truth:

@@ -20,6 +20,7 @@ from sloshlab.missing_physics.candidate import Candidate
 from sloshlab.missing_physics.extension import NOTHING, ActingDrive, Extension, SensorFault, with_acting
 from sloshlab.recording import channels
 from sloshlab.twin.lane_preparation import IN_TURN, Executor
+from sloshlab.twin.terms import Term
 from sloshlab.twin.twin import Twin
 from sloshlab.units import SI_UNITS
 from sloshlab.user_twin.description import Compared, EquationTwin, FreeTwin, Parameter, TwinRun, UserTwin
@@ -59,6 +60,7 @@ class UserTwinModel:
         self.executor: Executor = IN_TURN if isinstance(twin, FreeTwin) else executor
         self._lock = threading.Lock()
         self._truths: OrderedDict[tuple[Any, ...], Truth] = OrderedDict()
+        self._speeds_m_per_s: dict[str, float] = {}
         self._shown = {
             channel: shown if isinstance(shown, Compared) else Compared(shown)
             for channel, shown in twin.compared.items()
@@ -186,7 +188,19 @@ class UserTwinModel:
         run, extension = request.run, request.extension
         is_changed = undone or extension.drives
         view = _view(run, undone, extension.drives) if is_changed else self._views[run.name]
-        return Asked(view, self._numbers(request), extension.terms_in(run.name))
+        terms = extension.terms_in(run.name)
+        return Asked(view, self._numbers(request), terms, self._speed_m_per_s(run, terms))
+
+    def _speed_m_per_s(self, run: CaseRun, terms: Sequence[Term]) -> float:
+        """The largest of the twin as it is believed, for forces whose memories forget with the way."""
+        if not any(term.memory_rate(1.0) for term in terms):
+            return 0.0
+        if run.name not in self._speeds_m_per_s:
+            asked = Asked(self._views[run.name], self._own(run, {}), ())
+            [found] = self._simulator.truths([asked], IN_TURN)
+            speed = 0.0 if isinstance(found, SloshlabError) else float(np.abs(found[1][:, 1]).max())
+            self._speeds_m_per_s[run.name] = speed
+        return self._speeds_m_per_s[run.name]
 
     def _numbers(self, request: Request) -> dict[str, float]:
         """Of the twin itself, and those that effects give it."""

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.twin.structure import single_degree_of_freedom
-from sloshlab.twin.terms import Term
 from sloshlab.twin.twin import Twin
 from sloshlab.user_twin.added_force import AddedForce
 from sloshlab.user_twin.description import (
@@ -20,6 +19,7 @@ from sloshlab.user_twin.description import (
     TwinRun,
 )
 from sloshlab.user_twin.simulator import (
+    Asked,
     SimulatorOneByOne,
     Truth,
     called,
@@ -38,8 +38,9 @@ class OwnCodeSimulator(SimulatorOneByOne):
         self._lock = threading.Lock()
         self._speed_m_per_s = 0.0
 
-    def truth(self, run: TwinRun, own: Mapping[str, float], terms: Sequence[Term]) -> Truth:
+    def truth(self, asked: Asked) -> Truth:
         """See `SimulatorOneByOne.truth`."""
+        run, own, terms, _ = asked
         # The largest speed is known once the baseline has run; that run adds no friction.
         speed = self._twin.friction_speed_m_per_s or self._speed_m_per_s or 1e-3
         added = AddedForce(terms, speed)
@@ -97,8 +98,9 @@ class BlockSimulator(SimulatorOneByOne):
     def __init__(self, twin: BlockTwin, name: str) -> None:
         self._twin, self._name = twin, name
 
-    def truth(self, run: TwinRun, own: Mapping[str, float], terms: Sequence[Term]) -> Truth:
+    def truth(self, asked: Asked) -> Truth:
         """See `SimulatorOneByOne.truth`."""
+        run, own, terms, _ = asked
         if terms:
             names = ", ".join(term.name for term in terms)
             raise AnalysisError(f"{self._name}: {names}"[:120], got="a force", allowed="an effect of this twin")
@@ -114,7 +116,7 @@ class BlockSimulator(SimulatorOneByOne):
 
     def stand_in(self, run: TwinRun, own: Mapping[str, float]) -> Twin:
         """A mass on a spring of the frequency of the motion."""
-        displacement, _, acceleration = self.truth(run, own, ())[1].std(axis=0)
+        displacement, _, acceleration = self.truth(Asked(run, own, ()))[1].std(axis=0)
         return Twin(single_degree_of_freedom(1.0, max(float(acceleration / max(displacement, 1e-300)), 1e-12)))
 
     def moving_mass_kg(self, run: TwinRun, own: Mapping[str, float]) -> float:

@@ -30,11 +30,15 @@ MOST_EXCITATIONS: Final = 64
 
 
 class Asked(NamedTuple):
-    """One simulation of many: a run, the twin's own numbers, and forces that are added."""
+    """One simulation of many: a run, the twin's own numbers, and forces that are added.
+
+    The speed [m/s] is the largest of the twin without them; memories that forget with the way are followed by it.
+    """
 
     run: TwinRun
     own: Mapping[str, float]
     terms: Sequence[Term]
+    speed_m_per_s: float = 0.0
 
 
 class Simulator(Protocol):
@@ -129,14 +133,14 @@ class SimulatorInLanes(Generic[_T]):
 class SimulatorOneByOne:
     """Simulations that run one after the other."""
 
-    def truth(self, run: TwinRun, own: Mapping[str, float], terms: Sequence[Term]) -> Truth:
+    def truth(self, asked: Asked) -> Truth:
         """Simulate a run with numbers of its own and added forces; raises where that does not end."""
         raise NotImplementedError
 
     def truths(self, asked: Sequence[Asked], executor: Executor) -> list[Truth | SloshlabError]:
         """See `Simulator`."""
         del executor  # those who ask share candidates among its workers
-        return [or_why_not(self.truth, *each) for each in asked]
+        return [or_why_not(self.truth, each) for each in asked]
 
 
 def require_finite(values: FloatArray, what: str, rate_hz: float) -> None:

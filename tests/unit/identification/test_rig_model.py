@@ -13,6 +13,7 @@ from sloshlab.identification import rig_model
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_physics.extension import NOTHING, Extension, SensorFault
 from sloshlab.rig import Rig
+from sloshlab.twin.rate_independent_forces import HYSTERESIS
 from sloshlab.twin.structure_forces import COULOMB_FRICTION
 
 TANK_DAMPING = 1.5
@@ -202,6 +203,20 @@ def test_sensors_drive_by_their_noise(tmp_path: Path) -> None:
 
 def driving(model: RigModel) -> list[str]:
     return [f"gain of {name}" for name in model.driving(model.runs[0])]
+
+
+def test_steps_follow_how_fast_a_loop_yields() -> None:
+    """v ν/x_y: of 0.2 m/s and 0.1 mm 2000 a second, of exponent 2 twice as many; a power of two per sample."""
+    linear = HYSTERESIS(stiffness_n_per_m=1e6, beta_gamma=9e3, beta_delta=1e3)
+    squared = HYSTERESIS(stiffness_n_per_m=1e6, beta_gamma=50.0, beta_delta=50.0, exponent=2.0)
+    assert linear.memory_rate(0.2) == pytest.approx(2000.0)
+    assert squared.memory_rate(0.2) == pytest.approx(4000.0)
+    assert rig_model.steps_of_memory([linear], 100.0, 0.2) == 32
+    assert rig_model.steps_of_memory([linear, squared], 100.0, 0.2) == 64
+    assert rig_model.steps_of_memory([linear], 1e4, 0.2) == rig_model.steps_of_memory([], 100.0, 0.2) == 1
+    # neither a spring nor a loop that opens forever yields
+    assert HYSTERESIS(stiffness_n_per_m=0.0, beta_gamma=1.0, beta_delta=0.0).memory_rate(1.0) == 0.0
+    assert HYSTERESIS(stiffness_n_per_m=5e4, beta_gamma=800.0, beta_delta=-1100.0).memory_rate(1.0) == 0.0
 
 
 @pytest.mark.parametrize(("rate_hz", "n"), [(64.0, 8), (400.0, 2), (512.0, 1)])

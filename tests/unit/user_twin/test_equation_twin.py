@@ -256,6 +256,30 @@ def test_a_prescribed_motion_needs_no_states() -> None:
     assert model.moving_mass_kg == pytest.approx(50.0 * v.std() / a.std(), rel=0.02)
 
 
+def test_a_loop_that_yields_at_once_is_followed_along_a_prescribed_motion() -> None:
+    """Bouc–Wen with ν = 1, βγ = βδ: straight after a turn up to z = 0, then z_y (1 − e^(−Δx/x_y)).
+
+    It yields at 1/200 of the amplitude: in steps of 2 ms, by eight of its yield displacements each, it explodes.
+    """
+    size, omega, limit, yielding = 0.01, 2 * np.pi * 3.0, 3.0, 5e-5
+    x, v, a = (size * omega**k * part for k, part in enumerate((np.sin(omega * TIME), np.cos(omega * TIME),
+                                                                 -np.sin(omega * TIME))))  # fmt: skip
+    twin = EquationTwin(
+        isolator, {}, [Parameter("damping", 50.0, 10.0, "N s m-1")], ["displacement_table"], {"force_damper": "N"},
+        moves=["displacement_table"],
+    )  # fmt: skip
+    run = case_run(displacement_table=(x, "displacement"), force_damper=(50.0 * v, "force"))
+    half = 0.5 / yielding
+    loop = HYSTERESIS(stiffness_n_per_m=limit / yielding, beta_gamma=half, beta_delta=half)
+    found = UserTwinModel(twin, [run]).simulate(run, {"damping": 40.0}, Extension((loop,)))["force_damper"]
+    way = np.where(v > 0, x + size, size - x) / yielding
+    z = limit * np.where(way < 1.0, way - 1.0, -np.expm1(np.minimum(1.0 - way, 0.0)))
+    expected = 40.0 * v + 0.5 * a + np.sign(v) * z
+    # from the first turn on, where the motion is not at its turn: there its smoothing spline errs
+    kept = (np.arange(N) > RATE_HZ / 3.0) & (np.arange(N) < N - 10) & (way > 0.5)
+    np.testing.assert_allclose(found[kept], expected[kept], atol=0.02 * limit)
+
+
 def test_a_prescribed_motion_beside_states_is_refused() -> None:
     with pytest.raises(InputError, match="some beside a prescribed motion"):
         twin_of_cart(moves=("force_push",))
