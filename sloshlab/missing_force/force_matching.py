@@ -16,14 +16,12 @@ from typing import Final, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
-from scipy.linalg import orth
 from scipy.optimize import differential_evolution, least_squares
 
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.diagnosed_model import EXACT
 from sloshlab.identification.effort import Effort
-from sloshlab.identification.rig_model import steps_per_sample
+from sloshlab.identification.rig_model import MOST_STEPS_OF_MEMORY, steps_per_sample
 from sloshlab.missing_force.latent_force import (
     EITHER,
     STRUCTURE,
@@ -33,9 +31,10 @@ from sloshlab.missing_force.latent_force import (
     along,
     forces_alone,
 )
+from sloshlab.missing_force.shown_forces import MOST_OF_NOISE, ShownForces
 from sloshlab.missing_physics.candidate import Candidate, Numbers
 from sloshlab.missing_physics.prior import ParameterPrior
-from sloshlab.twin.excitation import Excitation, with_cached_inputs
+from sloshlab.twin.excitation import with_cached_inputs
 from sloshlab.twin.lane_preparation import Lane, motions
 from sloshlab.twin.lane_vector import N_LANES
 from sloshlab.twin.motion import Motion
@@ -52,9 +51,6 @@ _POPULATION, _GENERATIONS, _GENERATIONS_OF_AMPLITUDES = 32, 16, 64
 """Of differential evolution: some five hundred forces, and two thousand where amplitudes alone tell them apart."""
 _PARTED: Final = 0.5
 """Of the size of a force, by which it differs where bounces part; a smooth one differs by some hundredths."""
-_STRETCH_S: Final = 0.5
-_LINES_OF_A_CELL: Final = 4
-"""Two hertz apart: cells in which amplitudes are compared, as long as the blocks of a short-time spectrum."""
 _FEWEST: Final = 5
 """Of a population that evolves."""
 _STEP: Final = 1e-3
@@ -108,12 +104,13 @@ class ForceMatching:
         self, forces: Sequence[LatentForce], undivided: ShownForces | None = None, effort: Effort | None = None
     ) -> None:
         self._effort, self._n_samples = effort or Effort(), sum(force.force_n.size for force in forces)
-        self._drives = [_drive(force) for force in forces]
-        self._doubled = [_drive(force, 2.0) for force in forces]
+        self._ways = [_Way(force) for force in forces]
+        self._doubled = [_Way(force, 2.0) for force in forces]
         self._shown = [ShownForces(forces, [forces]), *([] if undivided is None else [undivided])]
         missing = np.concatenate([shown.missing for shown in self._shown])
         self.power = float(missing @ missing)
         self.is_more_than_noise = any(shown.is_more_than_noise for shown in self._shown)
+        self._noise = sum(shown.noise for shown in self._shown)
         self._scale = max(float(np.sqrt(np.mean(missing**2))), 1e-300)
         self._missing = missing / self._scale
 
@@ -155,7 +152,7 @@ class ForceMatching:
         Contacts and friction make the misfit rough (differential evolution, Storn and Price 1997,
         doi:10.1023/A:1008202821328). Where bounces part, two motions that are as likely have other phases, and the
         misfit says nothing: what evolves are then the amplitudes of short stretches. Of the population those are
-        refined that match best.
+        refined that match best. Nothing evolves where least squares alone leave no more than noise.
 
         Parameters
         ----------
@@ -163,6 +160,8 @@ class ForceMatching:
         ranked : sequence of Match
         """
         refined = self.refined(candidate, ranked)
+        if refined[0].misfit * self.power <= MOST_OF_NOISE * self._noise:
+            return refined
         scales = self._scales(candidate, ranked[0].numbers)
         if len(ranked) < _FEWEST or (scales and self._is_linear(candidate)):
             return refined
@@ -187,9 +186,8 @@ class ForceMatching:
         twin = force_alone(candidate, numbers)
         if twin is None:
             return False
-        for drive, doubled in zip(self._drives, self._doubled, strict=True):
-            n_substeps = steps_per_sample(twin, drive.sampling_rate_hz)
-            one, two = motions([Lane(twin, each, n_substeps=n_substeps) for each in (drive, doubled)])
+        for way, doubled in zip(self._ways, self._doubled, strict=True):
+            one, two = motions([each.lane(twin) for each in (way, doubled)])
             if not (_is_done(one) and _is_done(two)):
                 continue
             changes = [each.tank_force_n - each.tank_force_n.mean() for each in (one, two)]
@@ -296,20 +294,20 @@ class ForceMatching:
 
         None where there is no such force, or it does not reach the end of a run.
         """
-        n = len(self._drives)
+        n = len(self._ways)
         # As many as run side by side: whole runs of some hundred sets together would fill the memory.
         for first in range(0, len(sets), N_LANES):
-            twins = [force_alone(candidate, numbers) for numbers in sets[first : first + N_LANES]]
-            lanes = [
-                Lane(twin, drive, n_substeps=steps_per_sample(twin, drive.sampling_rate_hz))
-                for twin in twins
-                if twin is not None
-                for drive in self._drives
-            ]
+            twins = [self._followed(candidate, numbers) for numbers in sets[first : first + N_LANES]]
+            lanes = [way.lane(twin) for twin in twins if twin is not None for way in self._ways]
             self._effort.add(self._n_samples * len(lanes) // n)
             found = iter(motions(lanes))
             for twin in twins:
                 yield None if twin is None else self._joined(list(islice(found, n)))
+
+    def _followed(self, candidate: Candidate, numbers: Numbers) -> Twin | None:
+        """The force that a motion makes; none of one that changes faster than steps can follow."""
+        twin = force_alone(candidate, numbers)
+        return twin if twin is not None and all(way.follows(twin) for way in self._ways) else None
 
     def _joined(self, found: Sequence[Motion | Exception]) -> FloatArray | None:
         series = []
@@ -318,59 +316,6 @@ class ForceMatching:
                 return None
             series.append(motion.tank_force_n)
         return np.concatenate([shown.compared(series) for shown in self._shown]) / self._scale
-
-
-class ShownForces:
-    """Missing forces of some runs as others are compared with them.
-
-    Parameters
-    ----------
-    forces : sequence of LatentForce
-        One per run.
-    moved : sequence of sequences of LatentForce
-        Of every place at which the baseline may be off, one per run.
-
-    Attributes
-    ----------
-    whiteners : list of _Whitener
-        One per run.
-    missing : ndarray
-        Whitened, all runs one after the other, without what a spring, a damper, a mass and a constant force of
-        these places could do that are the same in all runs.
-    is_more_than_noise : bool
-        Whether its squares are more than those of noise besides those of noise.
-    """
-
-    def __init__(self, forces: Sequence[LatentForce], moved: Sequence[Sequence[LatentForce]]) -> None:
-        self.whiteners = [_Whitener(force) for force in forces]
-        of_runs = []
-        for whitener, *places in zip(self.whiteners, *moved, strict=True):
-            motions = [np.concatenate([place.motion_before, place.motion]) for place in places]
-            columns = [*(column for motion in motions for column in motion.T), np.ones(len(motions[0]))]
-            of_runs.append(np.stack([whitener.whitened(column) for column in columns], axis=1))
-        linear = np.concatenate(of_runs)
-        # Both places move alike where the base does not.
-        self._linear = orth(linear / np.maximum(np.abs(linear).max(axis=0), 1e-300))
-        known = zip(forces, self.whiteners, strict=True)
-        self.missing = self._without_linear(
-            np.concatenate([whitener.of_regularised(force.force_n) for force, whitener in known])
-        )
-        noise = sum(whitener.noise for whitener in self.whiteners)
-        self.is_more_than_noise = float(self.missing @ self.missing) > 2.0 * noise
-
-    def compared(self, series: Sequence[FloatArray]) -> FloatArray:
-        """Forces of all runs as the missing ones are.
-
-        Parameters
-        ----------
-        series : sequence of ndarray
-            From the start of each run.
-        """
-        of_runs = zip(series, self.whiteners, strict=True)
-        return self._without_linear(np.concatenate([whitener.whitened(each) for each, whitener in of_runs]))
-
-    def _without_linear(self, series: FloatArray) -> FloatArray:
-        return np.asarray(series - self._linear @ (self._linear.T @ series))
 
 
 @dataclass(frozen=True)
@@ -416,69 +361,34 @@ def matchings(forces: Sequence[RunForces], effort: Effort | None = None) -> Matc
     return Matchings(found, sum(found[place].power for place in lacking))
 
 
-class _Whitener:
-    """Spectra of forces of one run over the noise of the missing one, real parts before imaginary ones.
-
-    Squares add up to as many as there are samples for noise that the regularisation leaves whole.
-
-    Parameters
-    ----------
-    force : LatentForce
-    """
-
-    def __init__(self, force: LatentForce) -> None:
-        self._kept = slice(len(force.motion_before), len(force.motion_before) + len(force.motion))
-        # Lengths of many small factors are transformed many times as fast.
-        self._length, self._whole = (next_fast_len(2 * n, real=True) for n in (len(force.motion), self._kept.stop))
-        known = (force.kept_share > 0) & (force.noise_power > 0)
-        # The noise is that of a whole run, at half as many lines as that has padded samples.
-        power = np.where(known, force.noise_power, 1.0) * self._length / (2 * (force.kept_share.size - 1))
-        self._weights = _at_lines(np.where(known, 1.0 / np.sqrt(power), 0.0), self._length)
-        self._share = _at_lines(np.where(known, force.kept_share, 0.0), self._whole)
-        self._stretch = max(round(_STRETCH_S * force.run.attributes.sampling_rate_hz), 2 * _LINES_OF_A_CELL)
-
-    @property
-    def noise(self) -> float:
-        """Squares that are expected of noise alone."""
-        return float(self._kept.stop - self._kept.start) * float(np.mean(self._share**2))
-
-    @property
-    def n_values(self) -> int:
-        """Of a whitened force."""
-        return int(2 * (self._length // 2 + 1))
-
-    def amplitudes(self, whitened: FloatArray) -> FloatArray:
-        """Root of the power of a whitened force in cells of time and frequency."""
-        real, imaginary = np.split(whitened, 2)
-        series = irfft(real + 1j * imaginary, self._length)[: self._kept.stop - self._kept.start]
-        n = min(self._stretch, series.size)
-        stretches = series[: series.size // n * n].reshape(-1, n) * np.hanning(n)
-        power = np.abs(rfft(stretches)) ** 2
-        return np.sqrt(np.add.reduceat(power, np.arange(0, power.shape[1], _LINES_OF_A_CELL), axis=1)).ravel()
-
-    def whitened(self, series: FloatArray) -> FloatArray:
-        """Of a force as it acts, from the start of the run: what the regularisation took is no misfit."""
-        regularised = irfft(self._share * rfft(series[: self._kept.stop], self._whole), self._whole)
-        return self.of_regularised(regularised[self._kept])
-
-    def of_regularised(self, series: FloatArray) -> FloatArray:
-        """Of one that was regularised as the missing force was, as long as that."""
-        spectrum = self._weights * rfft(series, self._length)
-        return np.concatenate([spectrum.real, spectrum.imag])
-
-
-def _at_lines(values: FloatArray, n_samples: int) -> FloatArray:
-    """What is given at evenly spaced frequencies at those of a series of so many samples."""
-    return np.interp(np.linspace(0.0, 1.0, n_samples // 2 + 1), np.linspace(0.0, 1.0, values.size), values)
-
-
 def _is_done(motion: Motion | Exception) -> TypeGuard[Motion]:
     return not isinstance(motion, Exception) and motion.ending.status is Status.DONE
 
 
-def _drive(force: LatentForce, factor: float = 1.0) -> Excitation:
-    motion = factor * np.concatenate([force.motion_before, force.motion])
-    return with_cached_inputs(along(motion, force.run.attributes.sampling_rate_hz))
+class _Way:
+    """The recorded motion of one run, or a multiple of it, along which forces act.
+
+    Parameters
+    ----------
+    force : LatentForce
+    factor : float, optional
+    """
+
+    def __init__(self, force: LatentForce, factor: float = 1.0) -> None:
+        motion = factor * np.concatenate([force.motion_before, force.motion])
+        self._rate_hz = force.run.attributes.sampling_rate_hz
+        self._speed_m_per_s = float(np.abs(motion[:, 1]).max())
+        self._excitation = with_cached_inputs(along(motion, self._rate_hz))
+
+    def lane(self, twin: Twin) -> Lane:
+        """A force along it, in steps as small as its memory needs."""
+        n_substeps = steps_per_sample(twin, self._rate_hz, speed_m_per_s=self._speed_m_per_s)
+        return Lane(twin, self._excitation, n_substeps=n_substeps)
+
+    def follows(self, twin: Twin) -> bool:
+        """Whether there are steps as small as that."""
+        most = MOST_STEPS_OF_MEMORY * self._rate_hz
+        return all(term.memory_rate(self._speed_m_per_s) <= most for term in twin.terms)
 
 
 def _multiples(candidate: Candidate, numbers: Numbers) -> tuple[float, float]:
@@ -523,24 +433,34 @@ def force_alone(candidate: Candidate, numbers: Numbers) -> Twin | None:
 
 
 class _Logarithms:
-    """Numbers of an effect as logarithms of their sizes, signs as they are at a place."""
+    """Numbers of an effect as logarithms of their sizes, signs as they are at a place.
+
+    Of what may have either sign arsinh(number/smallest size), which is its logarithm but near zero, where it may
+    change its sign.
+    """
 
     def __init__(self, candidate: Candidate, at: Numbers) -> None:
         self._candidate, self._at = candidate, at
         priors = candidate.prior
         self._names = [known.name for known in priors]
         self._signs = np.array([np.sign(at[name]) or 1.0 for name in self._names])
-        ends = [_ends(known) for known in priors]
-        self.low, self.high = (np.log([each[k] for each in ends]) for k in (0, 1))
+        self._has_either = np.array([known.may_be_negative for known in priors], np.bool_)
+        least, most = np.array([_ends(known) for known in priors]).T
+        self._least = least
+        self.high = np.where(self._has_either, np.arcsinh(most / least), np.log(most))
+        self.low = np.where(self._has_either, -self.high, np.log(least))
 
     def of(self, numbers: Numbers) -> FloatArray:
         """Within the range that is believed."""
-        sizes = np.maximum(np.abs([numbers[name] for name in self._names]), 1e-300)
-        return np.asarray(np.clip(np.log(sizes), self.low, self.high))
+        values = np.array([numbers[name] for name in self._names])
+        logarithms = np.log(np.maximum(np.abs(values), 1e-300))
+        places = np.where(self._has_either, np.arcsinh(values / self._least), logarithms)
+        return np.asarray(np.clip(places, self.low, self.high))
 
     def numbers(self, x: FloatArray) -> dict[str, float]:
         """Within the bounds of the effect."""
-        moved = {**self._at, **dict(zip(self._names, (self._signs * np.exp(x)).tolist(), strict=True))}
+        values = np.where(self._has_either, self._least * np.sinh(x), self._signs * np.exp(x))
+        moved = {**self._at, **dict(zip(self._names, values.tolist(), strict=True))}
         within = _within_bounds(self._candidate, moved)
         return {f"{self._candidate.key}.{name}": value for name, value in within.items()}
 

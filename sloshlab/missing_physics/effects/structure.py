@@ -168,14 +168,15 @@ def _yield(at: Surroundings) -> float:
     return float(1.0 / (at.displacement_m * (0.03 * at.force_n) ** 0.5))
 
 
-_YIELD = Range(0.01, 1000.0, _yield, may_be_negative=True)
+_YIELD = Range(0.01, 1e4, _yield, may_be_negative=True)
+"""Up to 1/x_y of what yields at 3 % of m a and is as steep as the largest stiffness below, 300 m a/x."""
 # An exponent of one is a value like any other, so that it may rest at that bound.
 BOUC_WEN = force_effect(
     HYSTERESIS,
     "structure",
     _bouc_wen,
     ranges={
-        "stiffness_n_per_m": Range(1e-3, 3.0, scales.stiffness),
+        "stiffness_n_per_m": Range(1e-3, 300.0, scales.secant_stiffness),
         "beta_gamma": _YIELD,
         "beta_delta": _YIELD,
         "exponent": Range(1.0, 3.0, is_log=False),

@@ -82,23 +82,64 @@ def test_size_of_friction_beside_what_the_baseline_may_be_off(tmp_path: Path) ->
     assert best.misfit < 0.02
 
 
-def test_numbers_that_are_no_sizes_are_refined(tmp_path: Path) -> None:
-    """A rope's hysteresis: ż = k v (1 − ½ (1 + sgn(v z)) (|z|/z_y)), by SciPy, from draws of its prior."""
-    known = candidate(tmp_path, "structure.hysteresis")
-    motion = motion_of(0.004)
-    stiffness, limit = 800.0, 1.2
+def loop(motion: np.ndarray, limit: float, yielding: float, closing: float = 0.5) -> np.ndarray:
+    """ż = (z_y/x_y) v (1 − (c sgn(v z) + 1 − c) |z|/z_y), Bouc–Wen with ν = 1, by SciPy."""
 
     def rate(t: float, z: np.ndarray) -> np.ndarray:
         v = float(np.interp(t, TIME, motion[:, 1]))
-        loading = 0.5 * (1 + np.sign(v * z)) * np.abs(z) / limit
-        return np.asarray(stiffness * v * (1 - loading))
+        loading = (closing * np.sign(v * z) + 1 - closing) * np.abs(z) / limit
+        return np.asarray(limit / yielding * v * (1 - loading))
 
-    z = solve_ivp(rate, (0.0, TIME[-1]), [0.0], t_eval=TIME, max_step=1 / RATE_HZ, rtol=1e-8).y[0]
-    matching = ForceMatching([latent(-z, motion, "run_1")])
+    found = solve_ivp(rate, (0.0, TIME[-1]), [0.0], t_eval=TIME, max_step=1e-3, rtol=1e-7)
+    return np.asarray(found.y[0])
+
+
+def test_numbers_that_are_no_sizes_are_refined(tmp_path: Path) -> None:
+    """A rope's hysteresis, from draws of its prior."""
+    known = candidate(tmp_path, "structure.hysteresis")
+    motion = motion_of(0.004)
+    matching = ForceMatching([latent(-loop(motion, 1.2, 1.5e-3), motion, "run_1")])
     best = matched(matching, known, starts_of(known))
-    assert best.numbers["structure.hysteresis.stiffness_n_per_m"] == pytest.approx(stiffness, rel=0.01)
+    assert best.numbers["structure.hysteresis.stiffness_n_per_m"] == pytest.approx(800.0, rel=0.01)
     assert best.numbers["structure.hysteresis.exponent"] == pytest.approx(1.0, rel=0.01)
     assert best.misfit < 1e-4
+
+
+def test_a_refinement_changes_signs(tmp_path: Path) -> None:
+    """It starts where βδ = (1 − c)/x_y is positive, and ends at that of a loop that bulges."""
+    known = candidate(tmp_path, "structure.hysteresis")
+    motion = motion_of(0.004)
+    matching = ForceMatching([latent(-loop(motion, 1.2, 1e-3, closing=1.4), motion, "run_1")])
+    start = {"stiffness_n_per_m": 800.0, "beta_gamma": 480.0, "beta_delta": 320.0, "exponent": 1.2}
+    ranked = matching.ranked(known, [{f"{known.key}.{name}": value for name, value in start.items()}])
+    best = matching.refined(known, ranked)[0]
+    assert best.numbers["structure.hysteresis.beta_gamma"] == pytest.approx(1400.0, rel=0.02)
+    assert best.numbers["structure.hysteresis.beta_delta"] == pytest.approx(-400.0, rel=0.05)
+
+
+def test_a_loop_that_yields_at_once_is_followed(tmp_path: Path) -> None:
+    """At 2 % of the amplitude: in steps of 2 ms it would explode."""
+    known = candidate(tmp_path, "structure.hysteresis")
+    motion = motion_of(0.004)
+    limit, yielding = 1.2, 1e-4
+    matching = ForceMatching([latent(-loop(motion, limit, yielding), motion, "run_1")])
+    best = matching.evolved(known, matching.ranked(known, starts_of(known)))[0]
+    total = best.numbers["structure.hysteresis.beta_gamma"] + best.numbers["structure.hysteresis.beta_delta"]
+    stiffness = best.numbers["structure.hysteresis.stiffness_n_per_m"]
+    exponent = best.numbers["structure.hysteresis.exponent"]
+    assert (stiffness / total) ** (1 / exponent) == pytest.approx(limit, rel=0.02)
+    assert stiffness == pytest.approx(limit / yielding, rel=0.1)
+    assert best.misfit < 1e-3
+
+
+def test_a_loop_that_no_step_follows_is_not_simulated(tmp_path: Path) -> None:
+    """It yields within a nanometre, ten million times a second."""
+    known = candidate(tmp_path, "structure.hysteresis")
+    motion = motion_of(0.004)
+    matching = ForceMatching([latent(-np.sign(motion[:, 1]), motion, "run_1")])
+    numbers = {"stiffness_n_per_m": 1e9, "beta_gamma": 5e8, "beta_delta": 5e8, "exponent": 1.0}
+    [match] = matching._matches(known, [{f"{known.key}.{n}": v for n, v in numbers.items()}], scales=False)
+    assert match.misfit == pytest.approx(1e6)
 
 
 def bounced(known: Candidate, motion: np.ndarray, gap: float, stiffness: float, damping: float) -> np.ndarray:
