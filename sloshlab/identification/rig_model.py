@@ -59,8 +59,10 @@ _FINER_FOR_EVENTS: Final = 2.0
 """Factor where there are events: within longer steps friction may stop twice, and a contact open and close."""
 _STEPS_PER_FIRST_PERIOD: Final = 60.0
 """Of the lowest mode: forces with memory need them."""
-MOST_STEPS_OF_MEMORY: Final = 64
+MOST_STEPS_OF_MEMORY: Final = 32
 """Per sample; a loop that yields within a 64th of the way between two samples is dry friction to a recording."""
+_LARGEST_STEP_OF_MEMORY: Final = 2.0
+"""Over the time in which it forgets at the largest speed, where a loop has yielded; RK4 is stable up to 2.78."""
 _LEAST_STEPS_PER_S: Final = 500.0
 """Of a tank that follows its measured motion: forces with a running mean need some tens of steps per cycle.
 
@@ -538,8 +540,21 @@ def steps_of_memory(terms: Sequence[Term], sampling_rate_hz: float, speed_m_per_
     speed_m_per_s : float
         The largest of their place.
     """
-    needed = max((term.memory_rate(speed_m_per_s) for term in terms), default=0.0) / sampling_rate_hz
-    return int(2 ** math.ceil(math.log2(min(max(needed, 1.0), MOST_STEPS_OF_MEMORY))))
+    most = min(steps_needed(terms, sampling_rate_hz, speed_m_per_s), MOST_STEPS_OF_MEMORY)
+    return int(2 ** math.ceil(math.log2(most)))
+
+
+def steps_needed(terms: Sequence[Term], sampling_rate_hz: float, speed_m_per_s: float) -> float:
+    """The same without an upper limit, and not a power of two.
+
+    Parameters
+    ----------
+    terms : sequence of Term
+    sampling_rate_hz : float
+    speed_m_per_s : float
+    """
+    fastest = max((term.memory_rate(speed_m_per_s) for term in terms), default=0.0)
+    return max(fastest / (_LARGEST_STEP_OF_MEMORY * sampling_rate_hz), 1.0)
 
 
 def corrected(run: CaseRun, undone: Sequence[SensorFault], driving: Sequence[str]) -> xr.Dataset:

@@ -21,7 +21,7 @@ from scipy.optimize import differential_evolution, least_squares
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.diagnosed_model import EXACT
 from sloshlab.identification.effort import Effort
-from sloshlab.identification.rig_model import MOST_STEPS_OF_MEMORY, steps_per_sample
+from sloshlab.identification.rig_model import MOST_STEPS_OF_MEMORY, steps_needed, steps_per_sample
 from sloshlab.missing_force.latent_force import (
     EITHER,
     STRUCTURE,
@@ -387,8 +387,7 @@ class _Way:
 
     def follows(self, twin: Twin) -> bool:
         """Whether there are steps as small as that."""
-        most = MOST_STEPS_OF_MEMORY * self._rate_hz
-        return all(term.memory_rate(self._speed_m_per_s) <= most for term in twin.terms)
+        return steps_needed(twin.terms, self._rate_hz, self._speed_m_per_s) <= MOST_STEPS_OF_MEMORY
 
 
 def _multiples(candidate: Candidate, numbers: Numbers) -> tuple[float, float]:
