@@ -380,13 +380,13 @@ class RigModel:
                 self._kept_bytes -= self._truths.popitem(last=False)[1].n_bytes
 
     def _speed_m_per_s(self, run: CaseRun, twin: Twin) -> float:
-        """The largest of the tank as it is believed, for twins whose memories forget with the way."""
+        """The largest of structure and tank as they are believed, for twins whose memories forget with the way."""
         if not any(term.memory_rate(1.0) for term in twin.terms):
             return 0.0
         if run.name not in self._speeds_m_per_s:
             lane = self._lane(Request(run, self.believed, NOTHING), speed_m_per_s=0.0)
             believed = simulated(lane.twin, lane.excitation, lane.start, lane.n_substeps)
-            self._speeds_m_per_s[run.name] = float(np.abs(believed.places[:, 1, 1]).max())
+            self._speeds_m_per_s[run.name] = float(np.abs(believed.places[..., 1]).max())
         return self._speeds_m_per_s[run.name]
 
     def _lane(self, request: Request, speed_m_per_s: float | None = None) -> Lane:

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recorded_oscillators import DAMPING, NOISE, decays, driven, motion, rig, run_of
+from recorded_oscillators import DAMPING, NOISE, OMEGA, RATE_HZ, decays, driven, motion, rig, run_of
 
 from sloshlab.identification import rig_model
+from sloshlab.identification.diagnosed_model import Request
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_physics.extension import NOTHING, Extension, SensorFault
 from sloshlab.rig import Rig
@@ -221,6 +222,17 @@ def test_steps_follow_how_fast_a_loop_yields() -> None:
     # neither a spring nor a loop that opens forever yields
     assert HYSTERESIS(stiffness_n_per_m=0.0, beta_gamma=1.0, beta_delta=0.0).memory_rate(1.0) == 0.0
     assert HYSTERESIS(stiffness_n_per_m=5e4, beta_gamma=800.0, beta_delta=-1100.0).memory_rate(1.0) == 0.0
+
+
+def test_a_release_is_followed_by_its_own_speed(tmp_path: Path) -> None:
+    """ω x₀ is the largest: eleven steps, which are sixteen, from three times as far as four that are enough."""
+    model = RigModel(rig(tmp_path), tmp_path, decays())
+    near, far = model.runs
+    half = 0.5 * 11.0 * 2.0 * RATE_HZ / (OMEGA * 0.018)
+    loop = HYSTERESIS(stiffness_n_per_m=500.0, beta_gamma=half, beta_delta=half)
+    steps = [model._lane(Request(run, model.believed, Extension((loop,)))).n_substeps for run in (near, far)]
+    assert steps == [4, 16]
+    assert model._lane(Request(far, model.believed, NOTHING)).n_substeps < 4
 
 
 @pytest.mark.parametrize(("rate_hz", "n"), [(64.0, 8), (400.0, 2), (512.0, 1)])
