@@ -1,16 +1,20 @@
 """A structure that carries a tank, deflected and let go or moved at its base; without a liquid that sloshes.
 
-`CoupledTank` of `coupling` is the one with a liquid that is computed; what both tell is a `StructureHistory`.
+`CoupledTank` of `coupling` is the one whose liquid is computed as particles, `CoupledTwoPhaseTank` that of liquid
+and gas; what all tell is a `StructureHistory`.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from acquisition.numerical_tank.checkpoint_file import take_up
 from acquisition.numerical_tank.structure_motion import (
     TERMS,
     Motion,
@@ -73,7 +77,7 @@ class StructureHistory:
 
 
 class CarriedTank:
-    """What `CoupledTank` and `FrozenTank` have in common: a structure that is deflected and let go.
+    """What all structures with a tank have in common: they are deflected and let go, and moved at the base.
 
     Parameters
     ----------
@@ -141,6 +145,62 @@ class CarriedTank:
         n, time_s = self.structure.n_modes, (first + np.arange(base.size) + 0.5) * self.step_s
         q, p, a = (np.ascontiguousarray(rows[:, k * n : (k + 1) * n]) for k in range(3))
         return StructureHistory(np.asarray(time_s), base, q, p, a, forces, self.structure.shape_at_tank)
+
+
+class SloshingTank(CarriedTank):
+    """What structures with a computed liquid have in common: a state that a checkpoint keeps.
+
+    Parameters
+    ----------
+    tank : object
+        Of the liquid, with ``setup`` and ``n_steps``.
+    structure : Structure
+        Without the liquid.
+    carried : ndarray
+        What one step hands to the next beside the states of tank and structure; changed.
+    """
+
+    def __init__(self, tank: Any, structure: Structure, carried: FloatArray) -> None:
+        super().__init__(structure, tank.setup.step_s)
+        self.tank: Any = tank
+        self._carried = carried
+
+    @property
+    def n_steps(self) -> int:
+        """Steps done since the start."""
+        return int(self.tank.n_steps)
+
+    def advance(self, base_acceleration_m_per_s2: ArrayLike) -> StructureHistory:
+        """Take one step for each acceleration of the base, as the kind of liquid does."""
+        raise NotImplementedError
+
+    def structure_arrays(self) -> dict[str, NDArray[Any]]:
+        """Return copies of what a later step depends on beside the tank, for `coupled_checkpoint.save`."""
+        own = {f"structure_{name}": value.copy() for name, value in self._kept().items()}
+        return {**own, "structure_start": np.array([self._start_j])}
+
+    def restore_structure(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Take up the state that `structure_arrays` returned.
+
+        Parameters
+        ----------
+        arrays : mapping of str to ndarray
+
+        Raises
+        ------
+        KeyError
+            If one is missing.
+        InputError
+            If one does not belong to this structure or is not finite.
+        """
+        start = np.zeros(1)
+        targets = {f"structure_{name}": target for name, target in {**self._kept(), "start": start}.items()}
+        take_up(targets, arrays)
+        self._start_j = float(start[0])
+
+    def _kept(self) -> dict[str, FloatArray]:
+        q, p = self._motion
+        return {"q": q, "p": p, "energies": self._energies, "carried": self._carried}
 
 
 class FrozenTank(CarriedTank):

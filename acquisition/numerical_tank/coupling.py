@@ -12,16 +12,14 @@ what the liquid handed over and what the structure took differ by that, and both
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from acquisition.numerical_tank import stepping
-from acquisition.numerical_tank.carried_tank import CarriedTank, StructureHistory, as_base
-from acquisition.numerical_tank.checkpoint_file import take_up
+from acquisition.numerical_tank.carried_tank import SloshingTank, StructureHistory, as_base
 from acquisition.numerical_tank.simulation import NumericalTank
 from acquisition.numerical_tank.stepping import FORCE_Z, NO_ROOM, RUNNING, begin_step, end_step, pairs_are_listed
 from acquisition.numerical_tank.structure_motion import HANDED_OVER, step_structure
@@ -31,7 +29,7 @@ from acquisition.numerical_tank.tank import TankSetup
 FloatArray = NDArray[np.float64]
 
 
-class CoupledTank(CarriedTank):
+class CoupledTank(SloshingTank):
     """A numerical tank on a structure.
 
     Parameters
@@ -54,14 +52,7 @@ class CoupledTank(CarriedTank):
     """
 
     def __init__(self, setup: TankSetup, structure: Structure) -> None:
-        super().__init__(structure, setup.step_s)
-        self.tank = NumericalTank(setup)
-        self._carried = np.zeros(1)
-
-    @property
-    def n_steps(self) -> int:
-        """Steps done since the start."""
-        return self.tank.n_steps
+        super().__init__(NumericalTank(setup), structure, np.zeros(1))
 
     def advance(self, base_acceleration_m_per_s2: ArrayLike) -> StructureHistory:
         """Take one step for each acceleration of the base.
@@ -95,34 +86,6 @@ class CoupledTank(CarriedTank):
         interface = _Interface(per_particle, weight, self._carried)
         course = _Course(base, rows, forces)
         return int(_advance_coupled(self.tank.flow, self.tank.totals, self._moving, interface, course))
-
-    def structure_arrays(self) -> dict[str, NDArray[Any]]:
-        """Return copies of what a later step depends on beside the tank, for `coupled_checkpoint.save`."""
-        own = {f"structure_{name}": value.copy() for name, value in self._kept().items()}
-        return {**own, "structure_start": np.array([self._start_j])}
-
-    def restore_structure(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Take up the state that `structure_arrays` returned.
-
-        Parameters
-        ----------
-        arrays : mapping of str to ndarray
-
-        Raises
-        ------
-        KeyError
-            If one is missing.
-        InputError
-            If one does not belong to this structure or is not finite.
-        """
-        start = np.zeros(1)
-        targets = {f"structure_{name}": target for name, target in {**self._kept(), "start": start}.items()}
-        take_up(targets, arrays)
-        self._start_j = float(start[0])
-
-    def _kept(self) -> dict[str, FloatArray]:
-        q, p = self._motion
-        return {"q": q, "p": p, "energies": self._energies, "carried": self._carried}
 
 
 class _Interface(NamedTuple):

@@ -38,6 +38,7 @@ class InstabilityError(SloshlabError, ArithmeticError):
         self, reason: str, time_s: float, place_m: tuple[float, float], valid: Any, remedy: str = _REMEDY
     ) -> None:
         self.reason, self.time_s, self.place_m, self.valid = reason, time_s, place_m, valid
+        self.remedy = remedy
         super().__init__(
             f"numerical tank: {reason} at {time_s:.6g} s, x = {place_m[0]:.4g} m, z = {place_m[1]:.4g} m; "
             f"remedy: {remedy}"

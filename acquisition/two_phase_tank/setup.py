@@ -12,7 +12,6 @@ from sloshlab.errors import InputError
 MOST_CELLS: Final = 400_000
 FEWEST_CELLS: Final = 6
 """Along either side."""
-_LONGEST_STEP_S: Final = 2e-3
 
 
 @dataclass(frozen=True)
@@ -70,12 +69,15 @@ class GridNumerics:
         For the pressure.
     disturbance : float
         Standard deviation of the surface at the start, in cells; what the seed decides.
+    longest_step_s : float
+        Time step that is not exceeded, for what moves with the tank and asks for shorter ones.
     """
 
     courant_number: float = 0.45
     tolerance: float = 1e-6
     most_iterations: int = 600
     disturbance: float = 0.01
+    longest_step_s: float = 2e-3
 
 
 @dataclass(frozen=True)
@@ -148,7 +150,7 @@ class TwoPhaseSetup:
         """Time step: half of what capillary waves allow, a quarter of a cell at √(g H); its parts are shorter."""
         side = min(self.cell_m)
         fluids = self.fluids
-        longest = _LONGEST_STEP_S
+        longest = self.numerics.longest_step_s
         if fluids.surface_tension_n_per_m > 0:
             mass = (fluids.density_kg_per_m3 + fluids.gas_density_kg_per_m3) * side**3
             longest = min(longest, 0.5 * math.sqrt(mass / (4 * math.pi * fluids.surface_tension_n_per_m)))
@@ -236,6 +238,7 @@ _RANGES: Final = {
         "tolerance": (1e-13, 1e-3),
         "most_iterations": (1, 100_000),
         "disturbance": (0.0, 0.4),
+        "longest_step_s": (1e-7, 2e-3),
     },
 }
 

@@ -55,8 +55,7 @@ class CampaignSettings:
     overwrite : bool
         Whether recordings may be replaced that the manifest does not name.
     with_gas : bool
-        Whether liquid and gas are computed on a grid; else the liquid alone as particles. Only the runs on the
-        shaker are then made: a structure carries particles.
+        Whether liquid and gas are computed on a grid; else the liquid alone as particles.
     """
 
     seed: int = 0
@@ -94,8 +93,6 @@ def campaign_tasks(folder: Path, settings: CampaignSettings, runs: Sequence[Nume
         if number < 0:
             raise InputError(f"{name} of the campaign", got=str(number), allowed="≥ 0")
     chosen = [run for run in runs if fnmatch.fnmatchcase(run.name, settings.only)]
-    if settings.with_gas:
-        chosen = [run for run in chosen if run.is_on_shaker]
     if not chosen:
         names = ", ".join(run.name for run in runs[:2])
         raise InputError("--only", got=repr(settings.only), allowed=f"a pattern of names such as {names}")

@@ -17,7 +17,7 @@ from acquisition.numerical_tank.computed_force import PARTICLES, ComputedForce, 
 from acquisition.numerical_tank.instability import STOPPED
 from acquisition.numerical_tank.tank import Box, Liquid, TankSetup, filled_tank
 from acquisition.two_phase_tank.method import LIQUID_AND_GAS
-from acquisition.two_phase_tank.setup import Fluids, TwoPhaseSetup, filled_two_phase_tank
+from acquisition.two_phase_tank.setup import Fluids, GridNumerics, TwoPhaseSetup, filled_two_phase_tank
 from acquisition.virtual_laboratory.tone_motion import TankMotion
 from sloshlab._version import __version__
 from sloshlab.errors import InputError
@@ -61,7 +61,14 @@ def numerical_setup(rig: Rig, *, layers_per_height: int, seed: int, sampling_rat
     )
 
 
-def two_phase_setup(rig: Rig, *, cells_per_height: int, seed: int, sampling_rate_hz: float) -> TwoPhaseSetup:
+def two_phase_setup(
+    rig: Rig,
+    *,
+    cells_per_height: int,
+    seed: int,
+    sampling_rate_hz: float,
+    longest_step_s: float = GridNumerics().longest_step_s,
+) -> TwoPhaseSetup:
     """The tank of liquid and gas of a rig.
 
     Parameters
@@ -74,6 +81,8 @@ def two_phase_setup(rig: Rig, *, cells_per_height: int, seed: int, sampling_rate
         Of the disturbance at the start.
     sampling_rate_hz : float
         A whole number of steps makes a sample.
+    longest_step_s : float
+        Time step that is not exceeded.
 
     Raises
     ------
@@ -92,6 +101,7 @@ def two_phase_setup(rig: Rig, *, cells_per_height: int, seed: int, sampling_rate
         liquid.fill_level,
         cells_per_height,
         fluids=fluids,
+        numerics=GridNumerics(longest_step_s=longest_step_s),
         seed=seed,
         sampling_rate_hz=sampling_rate_hz,
     )
@@ -140,8 +150,7 @@ class NumericalLiquid:
     finished : callable, optional
         Called with what was computed, the time that it took included.
     with_gas : bool
-        Whether liquid and gas are computed on a grid; else the liquid alone as particles. A structure carries
-        particles only.
+        Whether liquid and gas are computed on a grid; else the liquid alone as particles.
     """
 
     layers_per_height: int = 16

@@ -15,26 +15,44 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.numerical_tank import coupled_checkpoint
-from acquisition.numerical_tank.carried_tank import FrozenTank, StructureHistory
+from acquisition.numerical_tank.carried_tank import FrozenTank, SloshingTank, StructureHistory
 from acquisition.numerical_tank.computed_force import SAVED_EVERY_S, ComputationInterruptedError
-from acquisition.numerical_tank.coupling import CoupledTank
+from acquisition.numerical_tank.coupled_checkpoint import CARRIED_PARTICLES, CarriedMethod
 from acquisition.numerical_tank.forced_motion import averaged
 from acquisition.numerical_tank.instability import InstabilityError
 from acquisition.numerical_tank.long_computation import LongComputation
 from acquisition.numerical_tank.sampling import HALF_LENGTH_SAMPLES, oversampling, sampled
 from acquisition.numerical_tank.structures import Structure
-from acquisition.numerical_tank.tank import TankSetup
 from sloshlab.errors import InputError
 
 FloatArray = NDArray[np.float64]
 
 _BLOCK_S: Final = 0.1
+
+
+class CarriedSetup(Protocol):
+    """A tank, of particles or of liquid and gas, whose time step is that of the structure, too."""
+
+    @property
+    def step_s(self) -> float:
+        """Time step."""
+        ...
+
+    @property
+    def steps_per_sample(self) -> int:
+        """Steps in one sample."""
+        ...
+
+    @property
+    def liquid_mass_kg(self) -> float:
+        """Of the liquid."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -43,7 +61,7 @@ class StructureTask:
 
     Attributes
     ----------
-    setup : TankSetup
+    setup : TankSetup or TwoPhaseSetup
         With a sampling rate.
     structure : Structure
         Without the liquid.
@@ -54,14 +72,17 @@ class StructureTask:
     configuration : {'sloshing', 'frozen', 'empty'}
     n_samples : int
         Wanted.
+    method : CarriedMethod
+        Of the setup.
     """
 
-    setup: TankSetup
+    setup: Any
     structure: Structure
     base_acceleration_m_per_s2: FloatArray
     initial_displacement_m: float
     configuration: str
     n_samples: int
+    method: CarriedMethod = CARRIED_PARTICLES
 
     def identity(self) -> NDArray[np.uint8]:
         """Hash of all that determines the result."""
@@ -95,25 +116,25 @@ class ComputedStructure:
     stopped: str = ""
 
 
-def n_steps_of(setup: TankSetup, n_samples: int) -> int:
+def n_steps_of(setup: CarriedSetup, n_samples: int) -> int:
     """Return the steps that so many samples need, those for the filter at the end included.
 
     Parameters
     ----------
-    setup : TankSetup
+    setup : TankSetup or TwoPhaseSetup
     n_samples : int
     """
     # the filter of the last sample needs half its length beyond it
     return (n_samples + HALF_LENGTH_SAMPLES) * setup.steps_per_sample
 
 
-def sampled_from_release(values: FloatArray, setup: TankSetup, n_samples: int) -> FloatArray:
+def sampled_from_release(values: FloatArray, setup: CarriedSetup, n_samples: int) -> FloatArray:
     """Return samples of values given in the middle of every step since the release.
 
     Parameters
     ----------
     values : ndarray, shape (n_steps,)
-    setup : TankSetup
+    setup : TankSetup or TwoPhaseSetup
     n_samples : int
         Wanted; fewer come back if the values end too early.
     """
@@ -205,7 +226,7 @@ class _Computation(LongComputation):
     @property
     def is_consistent(self) -> bool:
         """False if an interrupt fell between a block of steps and the storing of its means."""
-        return self._carried.n_steps == self._n_done * self._steps_per_mean
+        return bool(self._carried.n_steps == self._n_done * self._steps_per_mean)
 
     def advance(self) -> str:
         """Compute a block; return why it became unstable, or nothing."""
@@ -231,16 +252,16 @@ class _Computation(LongComputation):
         )
 
     def save(self, path: Path) -> None:
-        assert isinstance(self._carried, CoupledTank)
+        assert isinstance(self._carried, SloshingTank)
         beside: dict[str, NDArray[Any]] = {
             "run": self._task.identity(),
             "means": self._means[: self._n_done],
             "computing_s": np.array([self.computing_s]),
         }
-        coupled_checkpoint.save(self._carried, path, beside)
+        coupled_checkpoint.save(self._carried, path, beside, self._task.method)
 
     def restore(self, path: Path) -> None:
-        carried, beside = coupled_checkpoint.load(path)
+        carried, beside = coupled_checkpoint.load(path, self._task.method)
         if beside.get("run", np.zeros(0)).tobytes() != self._task.identity().tobytes():
             raise InputError(
                 f"{path}", got="the checkpoint of another run", remedy="remove it, or give another name"
@@ -253,10 +274,10 @@ class _Computation(LongComputation):
         self._means[: len(means)] = means
 
 
-def _carried(task: StructureTask) -> CoupledTank | FrozenTank:
-    carried: CoupledTank | FrozenTank
+def _carried(task: StructureTask) -> SloshingTank | FrozenTank:
+    carried: SloshingTank | FrozenTank
     if task.configuration == "sloshing":
-        carried = CoupledTank(task.setup, task.structure)
+        carried = task.method.couple(task.setup, task.structure)
     else:
         mass_kg = task.setup.liquid_mass_kg if task.configuration == "frozen" else 0.0
         carried = FrozenTank(mass_kg, task.structure, task.setup.step_s)

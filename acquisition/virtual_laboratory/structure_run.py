@@ -1,7 +1,7 @@
 """Virtual experiments in which a structure carries the tank: sloshing beam and guided tank.
 
-The liquid is that of the numerical tank, and structure and liquid move each other. A free run starts when the
-deflected structure is let go; a random run is moved at the root of the beam.
+The liquid is that of the numerical tank, as particles or with its gas; structure and liquid move each other. A
+free run starts when the deflected structure is let go; a random run is moved at the root of the beam.
 """
 
 from __future__ import annotations
@@ -16,11 +16,21 @@ from numpy.typing import NDArray
 
 from acquisition.numerical_tank.carried_tank import FrozenTank
 from acquisition.numerical_tank.computed_force import ComputedForce
+from acquisition.numerical_tank.coupled_checkpoint import CARRIED_PARTICLES
 from acquisition.numerical_tank.instability import STOPPED
+from acquisition.numerical_tank.sampling import LEAST_OVERSAMPLING
 from acquisition.numerical_tank.structures import Structure
 from acquisition.numerical_tank.tank import TankSetup
+from acquisition.two_phase_tank.method import CARRIED_LIQUID_AND_GAS
+from acquisition.two_phase_tank.setup import GridNumerics, TwoPhaseSetup
 from acquisition.virtual_laboratory.base_motion import RandomBaseMotion
-from acquisition.virtual_laboratory.numerical_liquid import NumericalLiquid, method_attributes, numerical_setup
+from acquisition.virtual_laboratory.numerical_liquid import (
+    NumericalLiquid,
+    method_attributes,
+    numerical_setup,
+    two_phase_attributes,
+    two_phase_setup,
+)
 from acquisition.virtual_laboratory.shaker_run import START_TIME_UTC
 from acquisition.virtual_laboratory.structure_channels import readings_of, recording_of, true_values
 from acquisition.virtual_laboratory.structure_computation import (
@@ -50,6 +60,8 @@ _COLUMN_OVER_STRUCTURE: Final = 2.0
 """Quarter-wave resonance c₀/4h of the liquid column over the highest natural frequency of the structure."""
 _LARGEST_SPEED_M_PER_S: Final = 10.0
 _LEAST_DAMPING_RATIO: Final = 0.02  # as a sloshing liquid gives
+_LARGEST_PHASE_PER_STEP: Final = 0.4
+"""ω Δt of the fastest mode with liquid and gas, whose own steps are longer: the leapfrog is 0.7 % too fast."""
 _LARGEST_SAMPLES: Final = 500_000
 """So that a checkpoint, which holds all that was computed, stays below 200 MB."""
 
@@ -112,7 +124,7 @@ def virtual_structure_run(
     sampling_rate_hz : float
         A whole number of steps makes a sample; all channels pass one filter of zero phase.
     speed_of_sound_m_per_s : float, optional
-        Of the computed liquid; by default what the Notes say, 25 m/s for the beam, and not less than 12 m/s.
+        Of the liquid as particles; by default what the Notes say, 25 m/s for the beam, and not less than 12 m/s.
     seed : int
         Of everything that differs between repeats.
     laboratory : StructureLaboratory, optional
@@ -144,7 +156,7 @@ def virtual_structure_run(
     random runs with damping ratios of 2 % at least. Besides, the liquid column must not resonate with the
     structure as no real one does: its c₀/4h is twice the highest natural frequency. At 12 m/s it meets the
     third mode of the beam, shatters the liquid at the release and takes a quarter of the first cycles'
-    amplitude; from 18 m/s on they no longer depend on c₀.
+    amplitude; from 18 m/s on they no longer depend on c₀. Liquid and gas on a grid are not compressed.
 
     Examples
     --------
@@ -162,9 +174,7 @@ def virtual_structure_run(
     numerical = numerical or NumericalLiquid()
     truth = laboratory or StructureLaboratory.perfect(rig)
     n_samples = _n_samples(duration_s, sampling_rate_hz)
-    setup = numerical_setup(
-        rig, layers_per_height=numerical.layers_per_height, seed=seed, sampling_rate_hz=sampling_rate_hz
-    )
+    setup = _setup(rig, truth, numerical, seed=seed, sampling_rate_hz=sampling_rate_hz)
     plan = _plan(
         rig,
         truth,
@@ -176,10 +186,16 @@ def virtual_structure_run(
         period_s=n_steps_of(setup, n_samples) * setup.step_s,
         seed=seed,
     )
-    setup = _with_sound(setup, plan, _largest_speed_m_per_s(plan, setup, duration_s), speed_of_sound_m_per_s)
+    setup = _for_speed(setup, plan, _largest_speed_m_per_s(plan, setup, duration_s), speed_of_sound_m_per_s)
     base_m_per_s2, base_m = plan.base_in_steps(n_steps_of(setup, n_samples))
     task = StructureTask(
-        setup, plan.rig.structure, base_m_per_s2, plan.initial_displacement_m, configuration, n_samples
+        setup,
+        plan.rig.structure,
+        base_m_per_s2,
+        plan.initial_displacement_m,
+        configuration,
+        n_samples,
+        CARRIED_LIQUID_AND_GAS if numerical.with_gas else CARRIED_PARTICLES,
     )
     computed = computed_structure(task, checkpoint=numerical.checkpoint, progress=numerical.progress)
     if numerical.finished is not None:
@@ -202,7 +218,7 @@ def virtual_structure_run(
         "start_time_utc": start_time_utc,
         "repeat": int(repeat),
         **_experiment_attributes(plan, rms_g),
-        **(method_attributes(setup) if configuration == SLOSHING else {"liquid": configuration, "seed": seed}),
+        **(_method_attributes(setup) if configuration == SLOSHING else {"liquid": configuration, "seed": seed}),
         **({STOPPED: computed.stopped} if computed.stopped else {}),
     }
     return recording_of(readings, plan.rig, sampling_rate_hz, attributes)
@@ -233,6 +249,30 @@ def _n_samples(duration_s: float, sampling_rate_hz: float) -> int:
     return n_samples
 
 
+def _setup(
+    rig: Rig, truth: StructureLaboratory, numerical: NumericalLiquid, *, seed: int, sampling_rate_hz: float
+) -> TankSetup | TwoPhaseSetup:
+    """The tank as it is computed, but for the speed of sound of particles."""
+    finely = numerical.layers_per_height
+    if not numerical.with_gas:
+        return numerical_setup(rig, layers_per_height=finely, seed=seed, sampling_rate_hz=sampling_rate_hz)
+    fastest_hz = float(structure_rig(rig, truth).structure.natural_frequencies_hz()[-1])
+    # no fewer steps in a sample than the filter wants that makes samples of them
+    longest_s = min(
+        _LARGEST_PHASE_PER_STEP / (2 * math.pi * fastest_hz),
+        1 / (LEAST_OVERSAMPLING * sampling_rate_hz),
+        GridNumerics().longest_step_s,
+    )
+    return two_phase_setup(
+        rig, cells_per_height=finely, seed=seed, sampling_rate_hz=sampling_rate_hz, longest_step_s=longest_s
+    )
+
+
+def _method_attributes(setup: TankSetup | TwoPhaseSetup) -> dict[str, Any]:
+    """Global attributes that tell how the liquid was computed."""
+    return two_phase_attributes(setup) if isinstance(setup, TwoPhaseSetup) else method_attributes(setup)
+
+
 def _plan(
     rig: Rig,
     truth: StructureLaboratory,
@@ -261,7 +301,7 @@ def _plan(
     return _Plan(true_rig, float(wanted), None)
 
 
-def _largest_speed_m_per_s(plan: _Plan, setup: TankSetup, duration_s: float) -> float:
+def _largest_speed_m_per_s(plan: _Plan, setup: TankSetup | TwoPhaseSetup, duration_s: float) -> float:
     """Largest speed of the tank relative to the root, without sloshing."""
     # damped as little as a beam without sloshing is, a random run would ask for far too fast a sound
     structure = plan.rig.structure if plan.base is None else _damped(plan.rig.structure)
@@ -291,8 +331,10 @@ def _damped(structure: Structure) -> Structure:
     return replace(structure, modes=modes)
 
 
-def _with_sound(setup: TankSetup, plan: _Plan, speed_m_per_s: float, wanted_m_per_s: float | None) -> TankSetup:
-    """The tank with a speed of sound that suits the experiment."""
+def _for_speed(
+    setup: TankSetup | TwoPhaseSetup, plan: _Plan, speed_m_per_s: float, wanted_m_per_s: float | None
+) -> TankSetup | TwoPhaseSetup:
+    """The tank for the largest speed of the experiment: particles with a sound that suits it."""
     if not speed_m_per_s <= _LARGEST_SPEED_M_PER_S:
         raise InputError(
             "speed of the tank",
@@ -300,6 +342,19 @@ def _with_sound(setup: TankSetup, plan: _Plan, speed_m_per_s: float, wanted_m_pe
             allowed=f"at most {_LARGEST_SPEED_M_PER_S:g} m/s",
             remedy="deflect or shake it less",
         )
+    if isinstance(setup, TwoPhaseSetup):
+        if wanted_m_per_s is not None:
+            raise InputError(
+                "speed_of_sound_m_per_s",
+                got=f"{wanted_m_per_s:g} for liquid and gas on a grid",
+                allowed="none: they are not compressed",
+            )
+        return setup
+    return _with_sound(setup, plan, speed_m_per_s, wanted_m_per_s)
+
+
+def _with_sound(setup: TankSetup, plan: _Plan, speed_m_per_s: float, wanted_m_per_s: float | None) -> TankSetup:
+    """The tank with a speed of sound that suits the experiment."""
     least = _SOUND_OVER_SPEED * speed_m_per_s
     if wanted_m_per_s is not None and not wanted_m_per_s >= least:
         raise InputError(

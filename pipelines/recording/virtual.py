@@ -198,9 +198,6 @@ def _check_run(run: VirtualRun) -> None:
         allowed = (*virtual_experiments(), CAMPAIGN)
         raise InputError("EXPERIMENT", got=repr(run.experiment), allowed=", ".join(allowed))
     _check_liquid(run.liquid)
-    if run.liquid == "two_phase" and EXPERIMENTS[run.experiment].structure:
-        remedy = "a structure carries particles: take numerical"
-        raise InputError("--liquid", got=f"two_phase for {run.experiment}", remedy=remedy)
 
 
 def _computed(run: VirtualRun, rig: RigSource, saved: Path) -> xr.Dataset:
@@ -293,7 +290,6 @@ def make_campaign_folder(
     ----------
     folder : Path
     liquid : {'law', 'numerical', 'two_phase'}
-        With its gas only what is on the shaker is made.
     settings : CampaignSettings
     say : callable
         Takes a line for every computed run.

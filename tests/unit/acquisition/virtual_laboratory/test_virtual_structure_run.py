@@ -379,3 +379,21 @@ def test_a_release_begins_where_the_source_lets_go(
     assert run.attrs["initial_displacement_m"] == deflection_m
     assert run.sizes["time"] == duration_s * run.attrs["sampling_rate_hz"]
     assert float(run["displacement_tank"][0]) == pytest.approx(deflection_m, rel=2e-3)
+
+
+def test_liquid_and_gas_have_no_speed_of_sound() -> None:
+    gas = NumericalLiquid(8, with_gas=True)
+    with pytest.raises(InputError, match="speed_of_sound_m_per_s: got 20 for liquid and gas"):
+        virtual_structure_run(BEAM, experiment="beam_free", numerical=gas, speed_of_sound_m_per_s=20.0)
+
+
+def test_liquid_and_gas_are_computed_in_steps_that_the_beam_allows(tmp_path: Path) -> None:
+    """Its third mode, 226.5 Hz with the frozen liquid, moves by less than 0.4 rad in a step."""
+    gas = NumericalLiquid(8, tmp_path / "kept", with_gas=True)
+    run = virtual_structure_run(BEAM, experiment="beam_free", duration_s=0.1, numerical=gas, imperfect=False)
+    assert run.attrs["liquid"] == "two_phase_tank"
+    assert 2 * math.pi * 226.5 * run.attrs["step_s"] < 0.4
+    assert float(run["displacement_tank"][0]) == pytest.approx(-0.0146, rel=2e-3)
+    # in the first tenth of a second the liquid is carried along as a mass
+    frozen_run = frozen(experiment="beam_free", duration_s=0.1)
+    np.testing.assert_allclose(run["displacement_tank"], frozen_run["displacement_tank"], atol=0.02 * 0.0146)
