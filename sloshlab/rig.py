@@ -60,12 +60,17 @@ class _Described(BaseModel):
 
 
 class Tank(_Described):
-    """A rigid box; `dry_mass_kg` is all that rests on the force cells without liquid."""
+    """A rigid box; `dry_mass_kg` is all that rests on the force cells without liquid.
+
+    `cell_frequency_hz` and `cell_damping_ratio` are those of that mass on the cells as springs.
+    """
 
     height_m: TankDimension
     length_m: TankDimension
     width_m: TankDimension
     dry_mass_kg: Mass
+    cell_frequency_hz: Frequency | None = None
+    cell_damping_ratio: DampingRatio | None = None
 
     @property
     def volume_m3(self) -> float:

@@ -16,6 +16,7 @@ from pipelines.structure.results import BeamRun, BeamSettings, ModeDecay, Random
 from pipelines.sweep.stages import examined_recording, require_usable
 from pipelines.twin.simulated_tank_model import departures_of
 from sloshlab.channel_names import ACCELERATION_ROOT, FORCE_INTERFACE
+from sloshlab.conditioning.cell_resonance import without_cell_resonance
 from sloshlab.conditioning.combined_channels import (
     acceleration_channels,
     force_channels,
@@ -109,7 +110,7 @@ def loaded(path: RunSource, recording: xr.Dataset, rig: Rig) -> Loaded:
         )
     quality = require_usable(recording, path)
     # of recordings only: a twin's force is that on the tank
-    recording = at_the_tank(recording, rig)
+    recording = at_the_tank(without_cell_resonance(recording, rig), rig)
     recording, examination = examined_recording(recording, path, Reference(rig))
     return Loaded(path, recording, attributes, quality, examination)
 

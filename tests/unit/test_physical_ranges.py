@@ -12,7 +12,14 @@ from sloshlab.errors import RigError
 from sloshlab.rig import Liquid, Rig, Structure, Tank
 
 BEAM: dict[str, dict[str, Any]] = {
-    "tank": {"height_m": 0.0272, "length_m": 0.1172, "width_m": 0.078, "dry_mass_kg": 0.61},
+    "tank": {
+        "height_m": 0.0272,
+        "length_m": 0.1172,
+        "width_m": 0.078,
+        "dry_mass_kg": 0.61,
+        "cell_frequency_hz": 400.0,
+        "cell_damping_ratio": 0.02,
+    },
     "liquid": {
         "density_kg_per_m3": 1000.0,
         "surface_tension_n_per_m": 0.0728,
