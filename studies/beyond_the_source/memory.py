@@ -69,7 +69,7 @@ def memory_lines(recordings: Recordings, workshop: Workshop) -> list[str]:
     chosen = min(candidates, key=lambda name: work_error(candidates[name], runs.between))
     lines.append(f"chosen: {chosen} and break-up; {candidates[chosen].break_up}")
     models = {**without, "with memory": [_with_memory(workshop, runs, chosen, seed) for seed in STARTS]}
-    for deflection_mm in DECAYS_MM:
+    for deflection_mm in filter(recordings.has_decays, DECAYS_MM):
         lines += decay_lines(f"decay from {deflection_mm} mm", recordings.decays(deflection_mm), models)
     return lines
 

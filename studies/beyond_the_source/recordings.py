@@ -54,11 +54,11 @@ class Recordings:
 
     def decays(self, deflection_mm: float) -> list[LiquidSignals]:
         """Return repeats of a decay of the beam, the release `REST_S` after the first sample."""
-        if deflection_mm == 14.6:
-            names = [f"beam/decay_sloshing_repeat_{repeat}" for repeat in (1, 2, 3)]
-        else:
-            names = [f"transients/beam_decay_{deflection_mm:.1f}mm_repeat_{repeat}" for repeat in (1, 2, 3)]
-        return [self._rested(self._on_beam(name)) for name in names]
+        return [self._rested(self._on_beam(name)) for name in _decay_names(deflection_mm)]
+
+    def has_decays(self, deflection_mm: float) -> bool:
+        """Return whether the decays from a deflection are there: not every campaign has the smaller ones."""
+        return all((self.folder / f"{name}.nc").is_file() for name in _decay_names(deflection_mm))
 
     def beam_random(self, rms_g: float) -> LiquidSignals:
         """Return motion of the tank on the beam whose root moves at random."""
@@ -113,6 +113,12 @@ class Recordings:
             force_names=force_channels(runs[0]),
             acceleration_names=acceleration_channels(runs[0]),
         )
+
+
+def _decay_names(deflection_mm: float) -> list[str]:
+    if deflection_mm == 14.6:
+        return [f"beam/decay_sloshing_repeat_{repeat}" for repeat in (1, 2, 3)]
+    return [f"transients/beam_decay_{deflection_mm:.1f}mm_repeat_{repeat}" for repeat in (1, 2, 3)]
 
 
 def part(signals: LiquidSignals, start_s: float, stop_s: float) -> LiquidSignals:

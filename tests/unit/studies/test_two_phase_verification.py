@@ -8,8 +8,9 @@ import pytest
 import xarray as xr
 
 import studies.two_phase_verification as room
+from acquisition.numerical_tank.carried_tank import StructureHistory
 from acquisition.two_phase_tank.setup import Fluids
-from studies.two_phase_verification import cases, maps, shaken
+from studies.two_phase_verification import cases, maps, release, shaken
 from studies.two_phase_verification.linear_theory import Layers
 
 KEPT = Path(room.__file__).with_name("shaken.json")
@@ -107,3 +108,30 @@ def test_facts_of_a_map_that_is_known() -> None:
     assert (found["largest"], found["its level"], found["β < 0"]) == (9.0, 4.0, 0.75)
     assert found["its ū"] == pytest.approx(4 * 9.80665 / (2 * np.pi * 11) ** 2 / 0.0272)
     assert maps.maps_figure({"w_bar": w_bar, "beta": beta}, {"w_bar": w_bar, "beta": beta}).startswith(b"\x89PNG")
+
+
+def test_first_works_of_a_damped_release_are_what_its_damper_takes() -> None:
+    """f = −c v with v = V e^{−st} sin ωt: c V²/2 (1 − e^{−2sT})/(2s) per cycle, to first order in s/ω."""
+    step_s, omega, s, c = 1e-4, 2 * np.pi * 10.87, 0.7, 3.0
+    time = (np.arange(12_000) + 0.5) * step_s
+    v = np.exp(-s * time) * np.sin(omega * time)
+    modes = np.stack([v, 0.2 * np.sin(8 * omega * time)], axis=1)
+    history = StructureHistory(time, 0 * time, modes, modes, modes, -c * v, np.array([1.0, 0.0]))
+    works = release.first_works_j(history, step_s)
+    period = 2 * np.pi / omega
+    starts = np.arange(8) * period
+    expected = c / 2 * (np.exp(-2 * s * starts) - np.exp(-2 * s * (starts + period))) / (2 * s)
+    assert works == pytest.approx(expected, rel=2e-3)
+
+
+def test_kept_releases_are_of_their_cases_and_their_accounts_close() -> None:
+    kept = json.loads(KEPT.with_name("released.json").read_text(encoding="utf-8"))
+    assert set(kept) == {case.name for case in release.CASES}
+    for name, found in kept.items():
+        assert release.Release(**found["case"]).name == name
+        residuals = [found[f"{of}_j"] for of in ("structure_residual", "fluids_residual", "between")]
+        assert np.abs(residuals).max() < 0.02 * found["stored_at_start_j"]
+        # the source's first cycles: the liquid needs time to break up
+        assert found["works_j"][0] < 0.1 * max(found["works_j"])
+    lines = release.rows(kept)
+    assert lines[2].startswith("| 16 | 0.25 ms | 0.3 ± 0.0 | 10.2 ± 1.6 |")
