@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
 
-CYCLES_PER_BLOCK: Final = 4
-"""Cycles of a chaotic liquid that follow each other are alike; those of two blocks are taken as independent."""
-FEWEST_BLOCKS: Final = 3
+FEWEST_CYCLES: Final = 12
+"""Fewer cycles do not tell over how many of them they are alike."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +22,7 @@ class MeanOverCycles:
     Attributes
     ----------
     value, standard_error : float
-        The error is NaN where there are too few blocks to tell.
+        The error is NaN where there are too few cycles to tell.
     """
 
     value: float
@@ -42,19 +41,15 @@ class MeanOverCycles:
 
 
 def mean_over_cycles(values: ArrayLike) -> MeanOverCycles:
-    """Mean of a value per cycle, and the standard error of the means of blocks of four.
+    """Mean of a value per cycle, and its standard error, `standard_error_of_correlated`.
 
     Parameters
     ----------
     values : array_like, shape (n_cycles,)
-        Of consecutive cycles; what is left of a last, incomplete block counts for the mean alone.
+        Of consecutive cycles.
     """
     cycles = np.asarray(values, float)
-    n_blocks = cycles.size // CYCLES_PER_BLOCK
-    if n_blocks < FEWEST_BLOCKS:
-        return MeanOverCycles(float(cycles.mean()), math.nan)
-    blocks = cycles[: n_blocks * CYCLES_PER_BLOCK].reshape(n_blocks, CYCLES_PER_BLOCK).mean(axis=1)
-    return MeanOverCycles(float(cycles.mean()), float(blocks.std(ddof=1)) / math.sqrt(n_blocks))
+    return MeanOverCycles(float(cycles.mean()), standard_error_of_correlated(cycles))
 
 
 def standard_error_of_correlated(values: ArrayLike) -> float:
@@ -72,10 +67,10 @@ def standard_error_of_correlated(values: ArrayLike) -> float:
     Returns
     -------
     float
-        In the unit of the values; NaN for fewer than `FEWEST_BLOCKS` times `CYCLES_PER_BLOCK`.
+        In the unit of the values; NaN for fewer than `FEWEST_CYCLES`.
     """
     cycles = np.asarray(values, float)
-    if cycles.size < FEWEST_BLOCKS * CYCLES_PER_BLOCK:
+    if cycles.size < FEWEST_CYCLES:
         return math.nan
     # what alternates from cycle to cycle, as a subharmonic does, cancels in a pair and in the mean
     pairs = cycles[cycles.size % 2 :].reshape(-1, 2).mean(axis=1)

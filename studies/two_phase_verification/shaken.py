@@ -23,7 +23,7 @@ from acquisition.numerical_tank.tank import STANDARD_GRAVITY_M_PER_S2, Box
 from acquisition.two_phase_tank.setup import Fluids, Walls, filled_two_phase_tank
 from acquisition.two_phase_tank.simulation import TwoPhaseTank
 from sloshlab.atomic_file import write_bytes
-from studies.tank_reference.steady_state import MeanOverCycles, standard_error_of_correlated
+from studies.tank_reference.steady_state import MeanOverCycles, mean_over_cycles
 
 TANK: Final = Box(0.1172, 0.0272, 0.078)
 RISE_CYCLES: Final = 3
@@ -85,6 +85,8 @@ class Shaken:
     ----------
     w_bar, beta : float
         Work of the tank on the fluids per cycle over m_l u₀² Ω², and −Re(Δf̌/ǔ̈)/m_l.
+    w_bar_of_cycles, beta_of_cycles : list of float
+        Of every cycle that counts.
     w_bar_scatter : float
         Standard deviation of W̄ between cycles.
     w_bar_error, beta_error : float
@@ -103,6 +105,8 @@ class Shaken:
 
     w_bar: float
     beta: float
+    w_bar_of_cycles: list[float]
+    beta_of_cycles: list[float]
     w_bar_scatter: float
     w_bar_error: float
     beta_error: float
@@ -139,7 +143,7 @@ def shaken(case: Shaking) -> Shaken:
         pass
     before = tank.account()
     unit = setup.liquid_mass_kg * (amplitude / omega) ** 2
-    works, in_phase = [], []
+    works, in_phase = list[float](), list[float]()
     for _ in range(n_used):
         blocks = list(moved(tank, motion, period, block_s=period))
         times = np.concatenate([block.time_s for block in blocks])
@@ -150,12 +154,15 @@ def shaken(case: Shaking) -> Shaken:
         in_phase.append(-2 * float(np.mean(excess * np.cos(omega * times))) / (setup.liquid_mass_kg * amplitude))
     spent = tank.account() - before
     given = spent.tank_work_j_per_m
+    w_bar, beta = mean_over_cycles(works), mean_over_cycles(in_phase)
     return Shaken(
-        float(np.mean(works)),
-        float(np.mean(in_phase)),
+        w_bar.value,
+        beta.value,
+        works,
+        in_phase,
         float(np.std(works)),
-        standard_error_of_correlated(works),
-        standard_error_of_correlated(in_phase),
+        w_bar.standard_error,
+        beta.standard_error,
         given * setup.box.depth_m / n_used / unit,
         {name.removesuffix("_j_per_m"): value / given for name, value in asdict(spent).items()},
         spent.residual_j_per_m / given,

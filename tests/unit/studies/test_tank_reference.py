@@ -145,10 +145,16 @@ def test_impossible_cases_are_refused(changes, message) -> None:
         replace(CASE, **changes)
 
 
-def test_error_of_a_mean_is_that_of_blocks() -> None:
-    """Blocks of 1, 2 and 3: standard deviation 1, over √3."""
-    mean = mean_over_cycles([1.0] * 4 + [2.0] * 4 + [3.0] * 4)
-    assert (mean.value, mean.standard_error) == (2.0, pytest.approx(1 / math.sqrt(3)))
+def test_error_of_a_mean_of_cycles_that_stay_alike() -> None:
+    """Runs of m equal cycles: a triangle of correlations of area m, so that the variance of the mean is m σ²/n.
+
+    Blocks of four, as if those were independent, give half of that error at m = 16.
+    """
+    rng, m, n_levels = np.random.default_rng(3), 16, 40
+    levels = rng.normal(size=(200, n_levels))
+    errors = [mean_over_cycles(np.repeat(run, m)).standard_error for run in levels]
+    assert math.sqrt(np.mean(np.square(errors))) == pytest.approx(1 / math.sqrt(n_levels), rel=0.1)
+    assert mean_over_cycles(np.arange(12.0)).value == 5.5
     assert math.isnan(mean_over_cycles([1.0] * 11).standard_error)
 
 
