@@ -10,14 +10,16 @@ import pytest
 
 from acquisition.numerical_tank.forced_motion import HarmonicMotion
 from acquisition.numerical_tank.simulation import NumericalTank
-from acquisition.numerical_tank.tank import LiquidColumn, TankSetup
+from acquisition.numerical_tank.tank import Box, LiquidColumn, TankSetup
+from acquisition.two_phase_tank.setup import Fluids, filled_two_phase_tank
+from acquisition.two_phase_tank.simulation import TwoPhaseTank
 from sloshlab.constants import GRAVITY_M_PER_S2
 from sloshlab.errors import InputError
 from sloshlab.reduced_order_model.model import ReducedOrderModel, Scaling
 from sloshlab.reduced_order_model.networks.multilayer import Multilayer
 from sloshlab.reduced_order_model.regressors import Delays
 from sloshlab.reduced_order_model.tank_scaling import TankScaling, tank_facts
-from studies.tank_scaling import campaign, varied_motion
+from studies.tank_scaling import campaign, second_liquid, varied_motion
 from studies.tank_scaling.changes import Mean, left_out_shares, measured, size_change
 from studies.tank_scaling.harmonic_runs import POINTS, HarmonicRun, Point, cycles_of, shaken
 from studies.tank_scaling.networks import model_for, rig_of_size, simulated, steady_state
@@ -271,3 +273,43 @@ def test_steady_state_of_a_delayed_damper(damper) -> None:
     w_bar, beta = steady_state(Delayed(), tank, POINT)
     assert w_bar == pytest.approx(math.pi * 2 * math.cos(angle) / (mass * omega), rel=2e-3)
     assert beta == pytest.approx(-2 * math.sin(angle) / (mass * omega), rel=2e-2)
+
+
+def test_other_fluids_in_the_training_tank_are_water_and_air_in_another() -> None:
+    """λ = 4: Re × 8 and Bo × 16 of the smaller tank give the same force over weight at times twice as long."""
+    small = second_liquid.ScaledShaking(3.8, 3.0, reynolds=8.0, bond=16.0).setup()
+    water = Fluids(density_kg_per_m3=1000.0)
+    large = filled_two_phase_tank(Box(4 * 0.1172, 4 * 0.0272, 0.078), 0.5, second_liquid.CELLS, fluids=water)
+    assert large.step_s == pytest.approx(2 * small.step_s, rel=1e-12)
+    motion = 3.0 * 9.81 * np.cos(0.05 * np.arange(60))
+    forces = [TwoPhaseTank(each).advance(motion).vertical_n / each.fluid_mass_kg for each in (small, large)]
+    assert forces[1] == pytest.approx(forces[0], rel=1e-8, abs=1e-8)
+    still_water = second_liquid.ScaledShaking(3.8, 3.0).setup()
+    assert still_water.fluids == water
+    assert second_liquid.ScaledShaking(3.8, 3.0, proportion=2.0).setup().box.length_m == 2 * 0.1172
+
+
+def test_changes_of_the_second_liquid_by_hand() -> None:
+    """W̄ of 1, twice as much where changed; three starts of 0.9, 1 and 1.1 have an error of 0.1/√3."""
+    results = {}
+    for change, work in ((second_liquid.UNCHANGED, 1.0), (second_liquid.CHANGES[0], 2.0)):
+        for point in second_liquid.POINTS:
+            for run in change.runs(point):
+                shift = {0: -0.1, 1: 0.0, 2: 0.1}[run.seed] if change is second_liquid.UNCHANGED else 0.0
+                results[run.name] = {"w_bar": [work + shift] * 24, "beta": [-0.1 * work] * 24}
+    mean, rms, chance = second_liquid.summary(results, second_liquid.CHANGES[0], "w_bar")
+    assert (mean, rms, chance) == pytest.approx((1.0, 1.0, 2 * 0.1 / math.sqrt(3)))
+    assert second_liquid.summary(results, second_liquid.CHANGES[0], "beta")[0] == pytest.approx(-0.1)
+    assert second_liquid.rows(results)[-1].startswith("| λ = 0.2 | +100 % | 100 % | 12 % | −0.100 |")
+
+
+def test_kept_runs_of_the_second_liquid_are_those_of_its_changes() -> None:
+    kept = json.loads(Path(second_liquid.__file__).with_suffix(".json").read_text())
+    changes = (second_liquid.UNCHANGED, *second_liquid.CHANGES)
+    wanted = [run for change in changes for point in second_liquid.POINTS for run in change.runs(point)]
+    assert list(kept) == [run.name for run in wanted]
+    assert all(second_liquid.ScaledShaking(**kept[run.name]["case"]) == run for run in wanted)
+    # W̄ of one run by hand
+    cycles = kept[wanted[12].name]["w_bar"]
+    found = second_liquid.mean_of(kept, second_liquid.CHANGES[0], second_liquid.POINTS[0], "w_bar")
+    assert found.value == pytest.approx(sum(cycles) / len(cycles), rel=1e-12)
