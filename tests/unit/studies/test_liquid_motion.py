@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from studies.liquid_motion import rolling
 from studies.liquid_motion import shaking as module
 from studies.liquid_motion.__main__ import sideways_of_linear_model
 from studies.liquid_motion.shaking import TANK, Shaken, Shaking, shaken
@@ -44,3 +45,27 @@ def test_sideways_force_of_the_linear_model_is_the_sum_of_its_modes():
     assert abs(sideways_of_linear_model()) == pytest.approx(
         abs(np.sum(share * omega**2 / (omega**2 - squared))), rel=0.02
     )
+
+
+def test_a_roll_swells_to_its_amplitude_and_leaves_no_tilt():
+    """θ̈ summed up twice is −θ₀ cos Ωt once it has swelled."""
+    step_s = 1e-5
+    times = (np.arange(60_000) + 0.5) * step_s
+    rate = np.cumsum(rolling.roll_acceleration(times, step_s, 0.02)) * step_s
+    # the rate is known at the ends of steps; its sum is the angle half a step later
+    angle = np.cumsum(rate) * step_s
+    late = times > 3.2 / 10.7
+    expected = -0.02 * np.cos(2 * np.pi * 10.7 * (times + step_s))
+    assert angle[late] == pytest.approx(expected[late], abs=1e-5)
+    assert np.abs(angle).max() == pytest.approx(0.02, rel=1e-3)
+
+
+def test_a_small_roll_alone_is_that_of_linear_theory(monkeypatch):
+    """Navier–Stokes on a grid against modes of potential flow: neither knows of the other."""
+    monkeypatch.setattr(rolling, "N_CYCLES", 9)
+    monkeypatch.setattr(rolling, "N_AVERAGED", 4)
+    monkeypatch.setattr(rolling, "CELLS", 12)
+    found = rolling.rolled(rolling.Rolling(0.0, 0.002)).sideways
+    model = rolling.sideways_of_linear_model(0.002)
+    assert found == pytest.approx(model, abs=0.03 * abs(model))
+    assert abs(model) > 4 * 0.002
