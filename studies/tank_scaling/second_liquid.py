@@ -48,6 +48,7 @@ class ScaledShaking:
     proportion : float
         Length over that of the training tank, at its height.
     seed : int
+    cells_per_height : int
     """
 
     omega_bar: float
@@ -56,6 +57,7 @@ class ScaledShaking:
     bond: float = 1.0
     proportion: float = 1.0
     seed: int = 0
+    cells_per_height: int = CELLS
 
     @property
     def name(self) -> str:
@@ -72,7 +74,7 @@ class ScaledShaking:
             surface_tension_n_per_m=water.surface_tension_n_per_m / self.bond,
         )
         longer = Box(box.length_m * self.proportion, box.height_m, box.depth_m)
-        return filled_two_phase_tank(longer, FILL_LEVEL, CELLS, fluids=fluids, seed=self.seed)
+        return filled_two_phase_tank(longer, FILL_LEVEL, self.cells_per_height, fluids=fluids, seed=self.seed)
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,7 @@ class Change:
     reynolds, bond, proportion : float
         As of `ScaledShaking`.
     seeds : tuple of int
+    cells_per_height : int
     """
 
     what: str
@@ -93,11 +96,12 @@ class Change:
     bond: float = 1.0
     proportion: float = 1.0
     seeds: tuple[int, ...] = (0,)
+    cells_per_height: int = CELLS
 
     def runs(self, point: Point) -> list[ScaledShaking]:
         """Return the runs of a point."""
         changed = ScaledShaking(point.omega_bar, point.level_g, self.reynolds, self.bond, self.proportion)
-        return [replace(changed, seed=seed) for seed in self.seeds]
+        return [replace(changed, seed=seed, cells_per_height=self.cells_per_height) for seed in self.seeds]
 
 
 def _larger(size: float) -> Change:
@@ -114,6 +118,13 @@ CHANGES: Final = (
     Change("half as long", proportion=0.5),
     Change("twice as long", proportion=2.0),
 )
+WEAK_POINT: Final = Point(3.8, 1.0)
+WEAK: Final = tuple(
+    Change(f"{what}, h/{cells}", bond=bond, seeds=(0, 1, 2), cells_per_height=cells)
+    for cells in (CELLS, 24)
+    for what, bond in (("training tank", 1.0), ("surface tension of λ = 25", 25.0**2))
+)
+"""At the weakest motion alone, where starts scatter most."""
 
 
 def shaken(run: ScaledShaking) -> dict[str, list[float]]:
@@ -178,7 +189,18 @@ def rows(results: Mapping[str, Mapping[str, Any]]) -> list[str]:
             for k, value in enumerate(summary(results, change, "beta"))
         ]
         lines.append(f"| {change.what} | {' | '.join(told)} |".replace("-", "−"))
+    lines += ["", f"| ω̄ = {WEAK_POINT.omega_bar:g}, {WEAK_POINT.level_g:g} g | W̄ | β |", "|---|---|---|"]
+    for change in WEAK:
+        if all(run.name in results for run in change.runs(WEAK_POINT)):
+            means = (mean_of(results, change, WEAK_POINT, name) for name in ("w_bar", "beta"))
+            lines.append(f"| {change.what} | {' | '.join(map(str, means))} |")
     return lines
+
+
+def all_runs() -> list[ScaledShaking]:
+    """Return the runs of all changes, and those of the weakest motion."""
+    of_changes = [run for change in (UNCHANGED, *CHANGES) for point in POINTS for run in change.runs(point)]
+    return list(dict.fromkeys([*of_changes, *(run for change in WEAK for run in change.runs(WEAK_POINT))]))
 
 
 def _is_known(results: Mapping[str, Any], change: Change) -> bool:
@@ -253,7 +275,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--figure", type=Path, help="picture to be written")
     chosen = parser.parse_args(arguments)
     results = json.loads(chosen.output.read_text()) if chosen.output.exists() else {}
-    cases = [run for change in (UNCHANGED, *CHANGES) for point in POINTS for run in change.runs(point)]
+    cases = all_runs()
     for number, case in enumerate(cases):
         if case.name not in results:
             sys.stderr.write(f"{number + 1} of {len(cases)}: {case.name}\n")

@@ -300,13 +300,14 @@ def test_changes_of_the_second_liquid_by_hand() -> None:
     mean, rms, chance = second_liquid.summary(results, second_liquid.CHANGES[0], "w_bar")
     assert (mean, rms, chance) == pytest.approx((1.0, 1.0, 2 * 0.1 / math.sqrt(3)))
     assert second_liquid.summary(results, second_liquid.CHANGES[0], "beta")[0] == pytest.approx(-0.1)
-    assert second_liquid.rows(results)[-1].startswith("| λ = 0.2 | +100 % | 100 % | 12 % | −0.100 |")
+    assert any(
+        line.startswith("| λ = 0.2 | +100 % | 100 % | 12 % | −0.100 |") for line in second_liquid.rows(results)
+    )
 
 
 def test_kept_runs_of_the_second_liquid_are_those_of_its_changes() -> None:
     kept = json.loads(Path(second_liquid.__file__).with_suffix(".json").read_text())
-    changes = (second_liquid.UNCHANGED, *second_liquid.CHANGES)
-    wanted = [run for change in changes for point in second_liquid.POINTS for run in change.runs(point)]
+    wanted = second_liquid.all_runs()
     assert list(kept) == [run.name for run in wanted]
     assert all(second_liquid.ScaledShaking(**kept[run.name]["case"]) == run for run in wanted)
     # W̄ of one run by hand
