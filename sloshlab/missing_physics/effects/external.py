@@ -6,7 +6,7 @@ What repeats from run to run is size, period and frequency; instants and phases 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from math import ceil, log, log1p, pi
+from math import ceil, isclose, log, log1p, pi
 from typing import Final
 
 import numpy as np
@@ -134,8 +134,12 @@ def _pulses_in(*, alternate: bool) -> Callable[[Surroundings, MissingForces], li
                         "width_s": n / at.sampling_rate_hz,
                     }
                     best[sign] = (score, sum(start < 0 for start in starts.values()), {**train, **starts})
-        # what alternates is as well its own reverse, begun earlier: it is told by the pulse it begins with
-        return [train for *_, train in sorted(best.values(), key=lambda found: (-found[0], found[1]))]
+        ranked = sorted(best.values(), key=lambda found: (-found[0], found[1]))
+        if alternate and len(ranked) == 2 and isclose(ranked[0][0], ranked[1][0]) and ranked[0][1] != ranked[1][1]:
+            # What alternates is as well its own reverse, begun a period earlier. Told by the first pulse that is
+            # seen it holds in runs, too, in which that is late.
+            ranked = [min(ranked, key=lambda found: found[1])]
+        return [train for *_, train in ranked]
 
     return proposed
 

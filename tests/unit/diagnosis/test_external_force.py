@@ -156,6 +156,19 @@ def test_a_train_may_begin_later_than_its_period_or_before_the_run(
         assert best[f"{key}.start_s in {name}"] == pytest.approx(start, abs=WIDTH_S)
 
 
+def test_alternating_pulses_are_told_by_the_first_that_is_seen(pulsed: RigModel) -> None:
+    """Reversed they would have begun before the runs, and in a run that they begin late one pulse too many."""
+    starts, key = {"first": 0.13, "second": 0.21}, "structure.alternating_pulses"
+    time = np.arange(2000) / RATE_HZ
+    missing = {name: np.array([pulses(start, -1.0)(t, 0.0, 0.0) for t in time]) for name, start in starts.items()}
+    train = Candidate(effect(key).of_runs(tuple(starts)), of_runs(pulsed))
+    [only] = train.proposed(missing)
+    assert only[f"{key}.size_n"] == pytest.approx(FORCE_N, rel=0.25)
+    assert all(
+        only[f"{key}.start_s in {name}"] == pytest.approx(start, abs=WIDTH_S) for name, start in starts.items()
+    )
+
+
 def test_a_missing_force_shows_the_line_that_is_in_it(pulsed: RigModel) -> None:
     generator = np.random.default_rng(6)
     at = of_runs(pulsed)
