@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from sloshlab.diagnosis.inference.diverging_motions import DivergingMotions
 from sloshlab.diagnosis.inference.fluctuating_liquid import with_fluctuation
+from sloshlab.diagnosis.inference.known_runs import KnownRuns
 from sloshlab.diagnosis.inference.posterior import Posterior, posterior
-from sloshlab.diagnosis.inference.run_noise import run_noise
 from sloshlab.diagnosis.inference.sampled_jumps import with_sampled_jumps
 from sloshlab.diagnosis.inference.scored_model import ScoredModel, scored
 from sloshlab.diagnosis.inference.whitened import WhitenedRun, whitened
@@ -210,7 +210,7 @@ class Scoring:
     ) -> None:
         self.model, self.held_out, self.everything = model, held_out, [*fitting, *held_out]
         self.tests, self._motions = tests, DivergingMotions(model, tests)
-        self.noise = [run_noise(model, run, nothing.values) for run in self.everything]
+        self.known = KnownRuns(model, self.everything, nothing.values)
 
     def of(self, fit: FreeRunFit, nothing: ScoredModel | None = None) -> ScoredModel | None:
         """A model; None where it does not reach the end of a run that it was not fitted to."""
@@ -225,7 +225,7 @@ class Scoring:
     def _whitened(self, fit: FreeRunFit) -> tuple[dict[str, float], _Residuals] | None:
         """Values in all runs, and of each run residuals and by what diverging motions differ."""
         values = values_of_runs(self.model, self.held_out, fit)
-        runs = whitened(self.model, self.everything, fit.candidates, values, self.noise, self._motions)
+        runs = whitened(self.model, self.known.under(fit.candidates), fit.candidates, values, self._motions)
         return None if runs is None else (values, [(run.residual, run.diverging) for run in runs])
 
     def _scored(
@@ -237,10 +237,8 @@ class Scoring:
         if found is None:
             return None
         values, residuals = found
-        runs = [
-            WhitenedRun(observed, residual, noise, diverging)
-            for observed, noise, (residual, diverging) in zip(self.everything, self.noise, residuals, strict=True)
-        ]
+        known = self.known.under(fit.candidates)
+        runs = [WhitenedRun(of_run, *of_model) for of_run, of_model in zip(known, residuals, strict=True)]
         return scored(fit, values, runs, {run[0].run.name for run in self.held_out}, nothing, self.tests)
 
     def required(self, fit: FreeRunFit, which: str) -> ScoredModel:

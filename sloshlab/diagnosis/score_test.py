@@ -29,9 +29,9 @@ class ScoreTest:
     ----------
     problem : FreeRunProblem
     theta, residual : ndarray
-        Optimum of the fit, and the residuals there.
+        Optimum of the fit, and the comparable residuals there.
     jacobian : BlockJacobian
-        There.
+        Of these.
     inflation : float
     """
 
@@ -43,7 +43,7 @@ class ScoreTest:
         jacobian: BlockJacobian,
         inflation: float,
     ) -> None:
-        inflation_weights = problem.inflation_weights(inflation)
+        inflation_weights = problem.comparison_weights(inflation)
         # A wide Huber limit: far from the optimum large residuals are what an effect has to explain.
         self._weights = inflation_weights * robust_weights(inflation_weights * residual, 10.0)
         # Everything that does not depend on the candidate is computed once.

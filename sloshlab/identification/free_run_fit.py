@@ -170,7 +170,7 @@ class _LevenbergMarquardt:
         return True
 
     def _cost(self) -> float:
-        misfit = huber_cost(self.inflation_weights * self.residual)
+        misfit = self.problem.misfit(self.residual, self.inflation)
         return misfit + self.problem.prior_cost(self.theta, self.inflation)
 
     def _step(self, damping: float, least: float) -> tuple[float, float, float]:
@@ -224,7 +224,7 @@ class _LevenbergMarquardt:
         """The fit as it is now."""
         # The misfit without inflated noise, whatever the last stage was, so that fits of different stages can be
         # compared.
-        misfit = huber_cost(self.residual)
+        misfit = self.problem.misfit(self.residual)
         return FreeRunFit(
             self.problem.candidates,
             self.problem.values(self.theta),
@@ -272,18 +272,14 @@ def costs_at(problem: FreeRunProblem, starts: Sequence[Mapping[str, float]], inf
     starts : sequence of mappings
     inflation : float
     """
-    inflation_weights = problem.inflation_weights(inflation)
     left = problem.residuals([problem.theta_of(start) for start in starts])
-    return [
-        huber_cost(inflation_weights * residual) if np.isfinite(residual).all() else np.inf for residual in left
-    ]
+    return [problem.misfit(residual, inflation) if np.isfinite(residual).all() else np.inf for residual in left]
 
 
 def inflated_cost(problem: FreeRunProblem, fit: FreeRunFit, inflation: float) -> float:
     """Cost of a fit with inflated noise, its prior included."""
     theta = problem.theta_of(fit.values)
-    misfit = huber_cost(problem.inflation_weights(inflation) * problem.residual(theta))
-    return misfit + problem.prior_cost(theta, inflation)
+    return problem.misfit(problem.residual(theta), inflation) + problem.prior_cost(theta, inflation)
 
 
 def fitted_baseline(

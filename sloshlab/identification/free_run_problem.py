@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import pairwise
 from typing import Final, TypeVar
 
@@ -17,6 +18,7 @@ from sloshlab.identification.diagnosed_model import DiagnosedModel, Request
 from sloshlab.identification.effort import Effort
 from sloshlab.identification.observations import Observation
 from sloshlab.missing_physics.candidate import Candidate, channels_of, extension_of
+from sloshlab.missing_physics.extension import Extension, left_out_of_drives
 
 FloatArray = NDArray[np.float64]
 _Label = TypeVar("_Label")
@@ -127,6 +129,8 @@ class FreeRunProblem:
         Parameters that are not free.
     effort : Effort, optional
         That of a search, to which its simulations are added.
+    faulty : collection of str, optional
+        Channels that leave the drive to others; those on which the candidates act if not given.
     """
 
     def __init__(
@@ -136,9 +140,14 @@ class FreeRunProblem:
         candidates: Sequence[Candidate] = (),
         fixed: Mapping[str, float] | None = None,
         effort: Effort | None = None,
+        faulty: Collection[str] | None = None,
     ) -> None:
         self.effort = effort or Effort()
-        self.model, self.runs, self.candidates = model, [run for run in runs if run], tuple(candidates)
+        self.model, self.candidates = model, tuple(candidates)
+        self.faulty = faulty_channels(candidates) if faulty is None else frozenset(faulty)
+        self._left_out = self.faulty - faulty_channels(candidates)
+        self._with_all = [run for run in runs if run]
+        self.runs = [[each.beside_faults(self.faulty) for each in run] for run in self._with_all]
         self.fixed = dict(fixed or {})
         present = {observation.run.name for run in self.runs for observation in run}
 
@@ -176,6 +185,60 @@ class FreeRunProblem:
         """Weights of the squares of scaled parameters with the slope of this cost; zero of those of effects."""
         weights = _tempering(inflation) * prior_weights(theta[: self.n_baseline])
         return np.pad(weights, (0, len(self.names) - self.n_baseline))
+
+    def misfit(self, residual: FloatArray, inflation: float = 0.0) -> float:
+        """Huber's loss of comparable residuals: minus twice a log-likelihood, but for a common constant.
+
+        Parameters
+        ----------
+        residual : ndarray
+        inflation : float, optional
+            As of `inflation_weights`.
+        """
+        comparable = self.comparable(residual)
+        return huber_cost(comparable if inflation == 0 else self.comparison_weights(inflation) * comparable)
+
+    def comparable(self, residual: FloatArray) -> FloatArray:
+        """Residuals by which models are compared in which others drive, or changes of them; a linear map.
+
+        Beside a fault of a sensor that has left the drive the other channels are taken given its reading, which
+        tells most of what its absence adds to their noise, and in the noise where all drive.
+
+        Parameters
+        ----------
+        residual : ndarray
+            As of `residual`.
+        """
+        if not self.is_otherwise_driven:
+            return residual
+        found, rows = [], iter(self._rows)
+        for run, known in zip(self.runs, self._with_all, strict=True):
+            own = [residual[next(rows)].reshape(each.spectra.shape) * np.sqrt(each.variance) for each in run]
+            place = {each.channel: i for i, each in enumerate(run)}
+            for i, with_all in enumerate(known):
+                faulty = [name for name in with_all.other_drives if name in self.faulty and name in place]
+                if with_all.channel in self.faulty or len(faulty) != 1:
+                    found.append(own[i] / np.sqrt(run[i].variance))
+                    continue
+                [name] = faulty
+                told = with_all.other_drives[name].told * own[place[name]]
+                found.append((own[i] - told) / np.sqrt(with_all.variance))
+        return np.concatenate([each.ravel() for each in found])
+
+    def comparison_weights(self, inflation: float) -> FloatArray:
+        """As `inflation_weights`, of comparable residuals.
+
+        Parameters
+        ----------
+        inflation : float
+        """
+        return _inflation_weights(self._with_all if self.is_otherwise_driven else self.runs, inflation)
+
+    @cached_property
+    def is_otherwise_driven(self) -> bool:
+        """Whether a sensor that drives elsewhere is faulty here."""
+        pairs = zip(self.runs, self._with_all, strict=True)
+        return any(new is not old for run, known in pairs for new, old in zip(run, known, strict=True))
 
     @property
     def changes_motion(self) -> NDArray[np.bool_]:
@@ -220,7 +283,7 @@ class FreeRunProblem:
         thetas = [self.theta_of(values) for values in several]
         return np.array(
             [
-                huber_cost(residual) + self.prior_cost(theta) if np.isfinite(residual).all() else np.inf
+                self.misfit(residual) + self.prior_cost(theta) if np.isfinite(residual).all() else np.inf
                 for theta, residual in zip(thetas, self.residuals(thetas), strict=True)
             ]
         )
@@ -229,23 +292,14 @@ class FreeRunProblem:
         """Weighted residuals of every observation of every part, one after the other."""
         self.effort.add(sum(observation.spectra.size for run, _ in parts for observation in run))
         for some in _at_once(parts):
-            yield from weighted_residuals(self.model, some, self.candidates)
+            yield from weighted_residuals(self.model, some, self.candidates, self._left_out)
 
     def inflation_weights(self, inflation: float) -> FloatArray:
         """Factors of the residuals with inflated noise: every channel known only to a share of its RMS.
 
         √(σ²/(σ² + share² ⟨y²⟩)) for the variance σ² of a coefficient of the channel y.
         """
-        return np.concatenate(
-            [
-                np.sqrt(
-                    observation.variance
-                    / (observation.variance + inflation**2 * float(np.mean(observation.spectra**2)))
-                ).ravel()
-                for run in self.runs
-                for observation in run
-            ]
-        )
+        return _inflation_weights(self.runs, inflation)
 
     def jacobian(
         self,
@@ -355,6 +409,30 @@ class FreeRunProblem:
         return blocks, runs
 
 
+def _inflation_weights(runs: Sequence[Sequence[Observation]], inflation: float) -> FloatArray:
+    return np.concatenate(
+        [
+            np.sqrt(each.variance / (each.variance + inflation**2 * float(np.mean(each.spectra**2)))).ravel()
+            for run in runs
+            for each in run
+        ]
+    )
+
+
+def faulty_channels(candidates: Sequence[Candidate]) -> frozenset[str]:
+    """Channels that are lost to a drive, as what some effects make of their readings cannot be undone.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+    """
+    of_sensors = [each for each in candidates if each.effect.block == "sensor"]
+    faults = [
+        fault for each in of_sensors for start in each.starts()[:1] for fault in extension_of([each], start).faults
+    ]
+    return frozenset(fault.channel for fault in faults if fault.leaves_drive)
+
+
 def _tempering(inflation: float) -> float:
     return TEMPERING if inflation == 0 else 1.0
 
@@ -371,7 +449,7 @@ def _at_once(parts: Sequence[_Part]) -> Iterator[Sequence[_Part]]:
 
 
 def weighted_residuals(
-    model: DiagnosedModel, parts: Sequence[_Part], candidates: Sequence[Candidate]
+    model: DiagnosedModel, parts: Sequence[_Part], candidates: Sequence[Candidate], left_out: Collection[str] = ()
 ) -> list[FloatArray]:
     """Weighted residuals; infinite of a run whose simulation does not reach its end.
 
@@ -381,6 +459,8 @@ def weighted_residuals(
     parts : sequence of (observations of one run, values)
         Values of the baseline, and ``key.parameter`` of every candidate.
     candidates : sequence of Candidate
+    left_out : collection of str, optional
+        Channels that do not drive, although no candidate acts on them.
 
     Returns
     -------
@@ -397,6 +477,8 @@ def weighted_residuals(
         except SloshlabError:
             requests.append(None)
         else:
+            if left_out:
+                extension += Extension(faults=left_out_of_drives(left_out))
             requests.append(Request(run[0].run, values, extension, [observation.channel for observation in run]))
     readings = iter(model.simulate_many([request for request in requests if request is not None]))
     sizes: list[int] = []

@@ -10,8 +10,9 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter
+from scipy.ndimage import uniform_filter, uniform_filter1d
 
+from sloshlab.conditioning.combined_channels import weights_by_noise
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.case import Case, CaseRun
 from sloshlab.identification.diagnosed_model import DiagnosedModel
@@ -21,6 +22,7 @@ from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.identification.observations import (
     IGNORED_VARIANCE,
     Observation,
+    OtherDrive,
     observations,
     slow_displacements,
     with_scatter,
@@ -31,6 +33,8 @@ from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_physics.extension import NOTHING
 
 FloatArray = NDArray[np.float64]
+_OfChannels = dict[tuple[str, str], FloatArray]
+"""Per run and channel."""
 _N_NOISE_DRAWS: Final = 4
 """Simulations with other noise, over which squares are averaged."""
 N_BLOCKS: Final = 9
@@ -73,12 +77,13 @@ def weighted_observations(case: Case, model: DiagnosedModel) -> dict[str, list[O
     sensors = {name: _with_simulated(observed, raw[name]) for name, observed in plain.items()}
     # The noise of drives goes in before the scatter of repeats, as a lower limit to it: a resonance passes that
     # noise in a band so narrow that two repeats tell little of it.
-    noise, draws = _noise_of_drives(case, model, sensors, fit)
+    noise, draws, without = _noise_of_drives(case, model, sensors, fit)
     plain = {
         name: [
             replace(
                 _with_noise_of_drive(observation, noise, model.driving(observation.run)),
                 of_drive=draws.get((observation.run.name, observation.channel)),
+                other_drives=_other_drives(observation, without, model.driving(observation.run)),
             )
             for observation in observed
         ]
@@ -112,22 +117,22 @@ def weighted_observations(case: Case, model: DiagnosedModel) -> dict[str, list[O
 
 def _noise_of_drives(
     case: Case, model: DiagnosedModel, plain: dict[str, list[Observation]], fit: FreeRunFit
-) -> tuple[dict[tuple[str, str], FloatArray], dict[tuple[str, str], FloatArray]]:
-    """Mean square that the noise of driving accelerometers adds to each coefficient, and draws of what it adds.
+) -> tuple[_OfChannels, _OfChannels, dict[str, dict[tuple[str, str], OtherDrive]]]:
+    """Variance that the noise of driving accelerometers adds to each coefficient, and draws of what it adds.
 
-    Both per run and channel; draws have the shape (n_draws, n_blocks, n_bands), and those of all channels of a run
-    are of the same noise of all accelerometers that drive it.
+    Draws have the shape (n_draws, n_blocks, n_bands), and those of all channels of a run are of the same noise of
+    all accelerometers that drive it; last the same without one of several that drive together, by that one.
 
     At a resonance it is narrow, and two repeats estimate it to a factor of two or three only. It is computed by
     simulations whose drive has as much noise once more, with the spectrum that repeats tell
-    (`noise_spectrum`). Of several that drive together each may have to do so alone, beside an effect on
-    the others, and the noisiest counts.
+    (`noise_spectrum`).
     """
     # A twin of a user's own cannot be asked what the noise of its drive makes of its channels.
     if not isinstance(model, RigModel) or case.rig is None:
-        return {}, {}
-    squares: dict[tuple[str, str], FloatArray] = {}
-    draws: dict[tuple[str, str], FloatArray] = {}
+        return {}, {}, {}
+    variances: _OfChannels = {}
+    draws: _OfChannels = {}
+    without: dict[str, dict[tuple[str, str], OtherDrive]] = {}
     spectrum_of = {
         name: noise_spectrum(case.tests(), name)
         for run in case.runs
@@ -135,22 +140,76 @@ def _noise_of_drives(
         if not run.is_free
     }
     for run in case.runs:
-        driving = model.driving(run)
+        driving, observed = model.driving(run), plain[run.name]
         # In free runs nothing drives.
-        if run.is_free or not plain[run.name]:
+        if run.is_free or not observed:
             continue
-        for kept in driving:
-            # An effect on a sensor leaves the drive to the others, against whose noise its gain must count.
-            recording = run.recording.drop_vars([name for name in driving if name != kept])
-            kept_alone = replace(run, recording=recording)
-            drawn = _propagated_noise(case, kept_alone, {kept: spectrum_of[kept]}, plain=plain, fit=fit)
-            for place, added in drawn.items():
-                # The maximum, not the sum: one sensor at a time drives alone.
-                square = _over_bands_of_a_resonance(np.mean(added**2, axis=0))
-                squares[place] = np.maximum(squares.get(place, 0.0), square)
         spectra = {name: spectrum_of[name] for name in driving}
-        draws |= _propagated_noise(case, run, spectra, plain=plain, fit=fit)
-    return squares, draws
+        drawn = _propagated_noise(case, run, spectra, plain=plain, fit=fit)
+        draws |= _shared(drawn, driving)
+        added = _added_variances(observed, drawn, driving)
+        variances |= added
+        for left_out in driving if len(driving) > 1 else ():
+            # An effect on a sensor leaves the drive to the others, against whose noise its gain must count.
+            kept = [name for name in driving if name != left_out]
+            others = replace(run, recording=run.recording.drop_vars(left_out))
+            drawn = _propagated_noise(case, others, {name: spectra[name] for name in kept}, plain=plain, fit=fit)
+            without.setdefault(left_out, {}).update(
+                _beside_fault(
+                    observed, added, _shared(drawn, kept), _added_variances(observed, drawn, kept), left_out
+                )
+            )
+    return variances, draws, without
+
+
+def _added_variances(observed: Sequence[Observation], drawn: _OfChannels, driving: Sequence[str]) -> _OfChannels:
+    """What the noise of those that drive adds to the variances of the channels of a run, as its draws say.
+
+    Deviations of n readings from their mean are n - 1 independent ones. Of channels that drive together each gets
+    their sum over n - 1 for its variance, which may be less than that of its sensor, so that all of them count as
+    much as what tells one from the others, whichever is faulty.
+    """
+    found = {
+        (each.run.name, each.channel): _over_bands_of_a_resonance(np.mean(of_channel**2, axis=0))
+        for each in observed
+        if (of_channel := drawn.get((each.run.name, each.channel))) is not None
+    }
+    together = [each for each in observed if each.channel in driving and (each.run.name, each.channel) in found]
+    if 1 < len(together) == len(driving):
+        pooled = sum(found[each.run.name, each.channel] for each in together) / (len(together) - 1)
+        found |= {(each.run.name, each.channel): pooled - each.variance for each in together}
+    return found
+
+
+def _shared(drawn: _OfChannels, driving: Sequence[str]) -> _OfChannels:
+    """Draws of what channels share with a drive: deviations from the mean of those that drive share nothing."""
+    return {place: 0.0 * of_channel if place[1] in driving else of_channel for place, of_channel in drawn.items()}
+
+
+def _beside_fault(
+    observed: Sequence[Observation], added: _OfChannels, drawn: _OfChannels, more: _OfChannels, left_out: str
+) -> dict[tuple[str, str], OtherDrive]:
+    """Noise of the channels of a run beside a fault, from what all and what the others add to variances."""
+    found = {}
+    faulty = next((each for each in observed if each.channel == left_out), None)
+    for each in observed:
+        place = (each.run.name, each.channel)
+        if place not in added:
+            continue
+        # The others alone are no quieter than all together; four draws may say so.
+        variance = np.maximum(more.get(place, 0.0) - added[place], 0.0)
+        own = drawn.get(place, np.zeros((_N_NOISE_DRAWS, *each.spectra.shape)))
+        told = np.zeros(each.spectra.shape)
+        if faulty is not None and faulty is not each and (each.run.name, left_out) in drawn:
+            reading = drawn[each.run.name, left_out]
+            told = _steady(own * reading) / (_steady(reading**2) + faulty.variance)
+        found[place] = OtherDrive(variance, own, told)
+    return found
+
+
+def _steady(drawn: FloatArray) -> FloatArray:
+    """Mean over draws and neighbouring blocks."""
+    return np.asarray(uniform_filter1d(drawn.mean(axis=0), N_BLOCKS, axis=0, mode="nearest"))
 
 
 def _with_noise_of_drive(
@@ -162,10 +221,25 @@ def _with_noise_of_drive(
     a few times its noise only.
     """
     variance = observation.variance + noise.get((observation.run.name, observation.channel), 0.0)
-    return replace(
-        observation,
-        variance=np.where(slow_displacements(observation, driving), _SLOW_DISPLACEMENT_ERROR**2, 1.0) * variance,
-    )
+    return replace(observation, variance=_slow_factors(observation, driving) * variance)
+
+
+def _slow_factors(observation: Observation, driving: Sequence[str]) -> FloatArray:
+    return np.where(slow_displacements(observation, driving), _SLOW_DISPLACEMENT_ERROR**2, 1.0)
+
+
+def _other_drives(
+    observation: Observation,
+    without: Mapping[str, Mapping[tuple[str, str], OtherDrive]],
+    driving: Sequence[str],
+) -> dict[str, OtherDrive]:
+    """Noise of an observation where one of several that drive is left out, by that one."""
+    place, slow = (observation.run.name, observation.channel), _slow_factors(observation, driving)
+    return {
+        left_out: replace(of_channels[place], added=slow * of_channels[place].added)
+        for left_out, of_channels in without.items()
+        if place in of_channels
+    }
 
 
 def _ignored_where_drive_noise_dominates(
@@ -223,9 +297,10 @@ def _propagated_noise(
                     if name in noise:
                         added = added + observation.of(noise[name])
                 elif name not in run.recording.data_vars:
-                    # A sensor that was left out of the drive is compared with the motion of the one kept, and so
-                    # with its noise.
-                    [added] = (-observation.of(own) for own in noise.values())
+                    # A sensor that was left out of the drive is compared with the motion of those kept, and so
+                    # with the noise of their mean.
+                    weights = weights_by_noise(run.recording, list(noise))
+                    added = -observation.of(np.tensordot(weights, list(noise.values()), axes=1))
                 else:
                     continue
                 drawn.setdefault((run.name, name), []).append(added)

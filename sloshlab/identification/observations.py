@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final
 
@@ -44,6 +44,33 @@ _LEAST_SHARE: Final = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
+class OtherDrive:
+    """Noise of a channel where one of several accelerometers is left out of the drive.
+
+    Attributes
+    ----------
+    added : ndarray, shape (n_blocks, n_kept)
+        Variance beyond that where all of them drive.
+    of_drive : ndarray, shape (n_draws, n_blocks, n_kept)
+        As in `Observation`.
+    told : ndarray, shape (n_blocks, n_kept)
+        What is expected of the residual per residual of the one that is left out, which has the same noise.
+    """
+
+    added: FloatArray
+    of_drive: FloatArray
+    told: FloatArray
+
+    def within(self, n_kept: int) -> OtherDrive:
+        """In the lowest bands alone."""
+        return OtherDrive(
+            np.ascontiguousarray(self.added[:, :n_kept]),
+            np.ascontiguousarray(self.of_drive[:, :, :n_kept]),
+            np.ascontiguousarray(self.told[:, :n_kept]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
 class Observation:
     """One channel of one run.
 
@@ -70,6 +97,8 @@ class Observation:
         Of the same, as a first fit of the baseline simulates it, where that is known.
     of_drive : ndarray, shape (n_draws, n_blocks, n_kept), or None
         What draws of the noise of a driving accelerometer make of the channel; all channels of a run share a draw.
+    other_drives : mapping of str to OtherDrive
+        By the accelerometer that does not drive, such as one that a model says is faulty.
     ignored : ndarray of bool, of the shape of `spectra`, or None
         Coefficients whose variance is inflated, so that they do not count.
     """
@@ -84,6 +113,7 @@ class Observation:
     is_rough: bool = False
     simulated: FloatArray | None = None
     of_drive: FloatArray | None = None
+    other_drives: Mapping[str, OtherDrive] = field(default_factory=dict)
     ignored: NDArray[np.bool_] | None = None
     without_scatter: FloatArray | None = None
 
@@ -137,6 +167,37 @@ class Observation:
         found = self.spectra - self._of(several)
         found *= self._inverse_deviation
         return np.asarray(found)
+
+    def beside_faults(self, faulty: Collection[str]) -> Observation:
+        """Known as where faulty channels leave the drive to the others; itself if none of them drives.
+
+        Parameters
+        ----------
+        faulty : collection of str
+        """
+        left_out = tuple(name for name in self.other_drives if name in faulty)
+        if not left_out:
+            return self
+        if left_out not in self._beside_faults:
+            # Of several that are left out the noisiest drive counts.
+            others = [self.other_drives[name] for name in left_out]
+            added = np.max([other.added for other in others], axis=0)
+            if self.ignored is not None:
+                added = np.where(self.ignored, 0.0, added)
+            least = self.without_scatter
+            self._beside_faults[left_out] = replace(
+                self,
+                variance=self.variance + added,
+                without_scatter=None if least is None else least + added,
+                of_drive=max(others, key=lambda other: float(other.added.sum())).of_drive,
+                other_drives={},
+            )
+        return self._beside_faults[left_out]
+
+    @cached_property
+    def _beside_faults(self) -> dict[tuple[str, ...], Observation]:
+        """Those that were asked for, as every problem with the same faults needs them."""
+        return {}
 
     @cached_property
     def _inverse_deviation(self) -> FloatArray:
@@ -280,6 +341,7 @@ def within_informative_bands(observed: Sequence[Observation]) -> list[Observatio
             of_drive=None
             if observation.of_drive is None
             else np.ascontiguousarray(observation.of_drive[:, :, :n_kept]),
+            other_drives={name: other.within(n_kept) for name, other in observation.other_drives.items()},
             ignored=None if observation.ignored is None else observation.ignored[:, :n_kept],
             without_scatter=None
             if observation.without_scatter is None

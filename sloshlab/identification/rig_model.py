@@ -423,8 +423,8 @@ class RigModel:
         """
         if run.is_free:
             return []
-        faulty = {fault.channel for fault in undone}
         driving, compared = self.driving(run), self._channels[run.name].compared
+        faulty = {fault.channel for fault in undone if fault.leaves_drive or len(driving) == 1}
         is_alone = len(driving) == 1 and run.recording[driving[0]].attrs["quantity"] == "acceleration"
         return [name for name in driving if (name in compared or is_alone) and name not in faulty]
 
@@ -558,7 +558,7 @@ def steps_needed(terms: Sequence[Term], sampling_rate_hz: float, speed_m_per_s: 
 
 
 def corrected(run: CaseRun, undone: Sequence[SensorFault], driving: Sequence[str]) -> xr.Dataset:
-    """The recording with faults of driving channels undone; one of several is left out instead.
+    """The recording with faults of driving channels undone; one of several whose fault cannot be is left out.
 
     Parameters
     ----------
@@ -574,9 +574,9 @@ def corrected(run: CaseRun, undone: Sequence[SensorFault], driving: Sequence[str
     """
     recording = run.recording
     for fault in undone:
-        # A redundant sensor with a fault is left out: the others drive, and its own reading tests the fault.
+        # The others drive then, and its own reading tests the fault.
         redundant = [name for name in driving if name != fault.channel and name in recording.data_vars]
-        if redundant and fault.channel in recording.data_vars:
+        if fault.leaves_drive and redundant and fault.channel in recording.data_vars:
             recording = recording.drop_vars(fault.channel)
             continue
         if fault.undone is None:

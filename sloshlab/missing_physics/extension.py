@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -34,6 +34,8 @@ class SensorFault:
         Identifies the fault, for caches.
     run : str
         In which alone it acts; empty where it acts in all.
+    reads_others : bool
+        Whether readings of other channels are part of it.
     """
 
     channel: str
@@ -41,10 +43,35 @@ class SensorFault:
     undone: Reading | None
     key: tuple[Any, ...]
     run: str = ""
+    reads_others: bool = False
+
+    @property
+    def leaves_drive(self) -> bool:
+        """Whether the channel is left out where others can drive: what it should show is lost, or would be
+        known only with the noise of channels that the simulation is compared with.
+        """
+        return self.undone is None or self.reads_others
 
     def acts_on(self, channel: str, run: str) -> bool:
         """Whether it changes a channel of a run."""
         return self.channel == channel and self.run in ("", run)
+
+
+def _as_it_is(
+    shown: FloatArray, rate_hz: float, others: Mapping[str, FloatArray], recorded: FloatArray
+) -> FloatArray:
+    del rate_hz, others, recorded
+    return shown
+
+
+def left_out_of_drives(channels: Iterable[str]) -> tuple[SensorFault, ...]:
+    """Faults that change no reading, by which channels leave the drive to others beside them.
+
+    Parameters
+    ----------
+    channels : iterable of str
+    """
+    return tuple(SensorFault(name, _as_it_is, None, ("left out", name)) for name in sorted(channels))
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,8 @@ class IndependentResiduals:
         As in `RunNoise`.
     is_informative : ndarray of bool, shape (n_blocks, n_bands)
         Where some channel stands out of the noise.
+    log_density : ndarray, shape (n_blocks, n_bands)
+        As in `KnownRun`; zero where it has none.
     """
 
     residual: FloatArray
@@ -49,6 +51,7 @@ class IndependentResiduals:
     places: Mapping[str, tuple[FloatArray, FloatArray]]
     exactness: Mapping[str, float]
     is_informative: NDArray[np.bool_]
+    log_density: FloatArray
 
 
 def independent_residuals(
@@ -78,11 +81,12 @@ def _of_run(run: WhitenedRun, missing: WhitenedRun | None) -> IndependentResidua
     return IndependentResiduals(
         run.noise.whitened(run.residual),
         [run.noise.whitened(run.simulated)],
-        [] if missing is None else [run.noise.whitened(missing.residual)],
+        [] if missing is None else [run.noise.whitened(missing.in_noise_of(run))],
         [run.noise.whitened(change) for change in run.diverging],
         run.noise.places,
         run.noise.exactness,
         np.any([each.informative for each in run.observed], axis=0),
+        np.zeros(run.residual.shape[1:]) if run.known.log_density is None else run.known.log_density,
     )
 
 
@@ -102,6 +106,8 @@ def _combined(repeats: Sequence[IndependentResiduals]) -> list[IndependentResidu
             {place: (rows[:, :n], shares[:, :n]) for place, (rows, shares) in first.places.items()},
             first.exactness,
             np.any([each.is_informative[:, :n] for each in repeats], axis=0),
+            # Combinations are orthonormal, so that all together have the densities of all repeats.
+            np.mean([each.log_density[:, :n] for each in repeats], axis=0),
         )
         for row in helmert(len(repeats), full=True)
     ]

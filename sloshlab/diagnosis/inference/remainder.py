@@ -91,7 +91,7 @@ def remainder(
     noise: list[FloatArray] = []
     per_run: list[dict[str, FloatArray]] = []
     for each in independent_residuals(runs, missing, tests):
-        plain = sums_of_cells((-0.5 * each.residual**2).sum(axis=0))
+        plain = sums_of_cells((-0.5 * each.residual**2).sum(axis=0) + each.log_density)
         gains = {place: _gains(each.residual, *directions) for place, directions in each.places.items()}
         small = {place: _POWERS[:, None, None] < power for place, power in _powers_of_inexactness(each).items()}
         # Noise, and what a simulation that is as exact as it can be leaves at any place.

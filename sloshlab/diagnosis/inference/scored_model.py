@@ -199,7 +199,7 @@ def difference(first: ScoredModel, other: ScoredModel) -> float:
     first, other : ScoredModel
     """
     return 0.5 * sum(
-        float(np.sum(one.noise.whitened(one.residual - two.residual) ** 2))
+        float(np.sum(one.noise.whitened(one.residual - two.in_noise_of(one)) ** 2))
         for one, two in zip(first.runs, other.runs, strict=True)
     )
 
@@ -216,10 +216,11 @@ def strength(before: ScoredModel, after: ScoredModel) -> float:
     """
     largest = 0.0
     for one, two in zip(before.runs, after.runs, strict=True):
+        changes = one.residual - two.in_noise_of(one)
         for i, observation in enumerate(one.observed):
             shown = observation.informative
             if shown.sum() >= _FEWEST_COEFFICIENTS:
-                added = one.residual[i][shown] - two.residual[i][shown]
+                added = changes[i][shown]
                 largest = max(largest, float(np.mean(added**2)))
     return float(np.sqrt(largest))
 

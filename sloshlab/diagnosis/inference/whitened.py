@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sloshlab.diagnosis.inference.diverging_motions import DivergingMotions
+from sloshlab.diagnosis.inference.known_runs import KnownRun
 from sloshlab.diagnosis.inference.run_noise import RunNoise
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.diagnosed_model import DiagnosedModel
@@ -24,26 +25,45 @@ class WhitenedRun:
 
     Attributes
     ----------
-    observed : sequence of Observation
-        Its channels.
+    known : KnownRun
+        Under the model.
     residual : ndarray, shape (n_channels, n_blocks, n_bands)
         Recorded minus simulated spectra over the standard deviation of the noise.
-    noise : RunNoise
-        Of its channels together.
     diverging : list of ndarray
         By what motions differ that are as likely as the simulated one, each of the shape of `residual`.
     """
 
-    observed: Sequence[Observation]
+    known: KnownRun
     residual: FloatArray
-    noise: RunNoise
     diverging: list[FloatArray] = field(default_factory=list)
+
+    @property
+    def observed(self) -> Sequence[Observation]:
+        """Its channels."""
+        return self.known.observed
+
+    @property
+    def noise(self) -> RunNoise:
+        """Of its channels together."""
+        return self.known.noise
 
     @property
     def simulated(self) -> FloatArray:
         """Simulated spectra in standard deviations of the noise, of the shape of `residual`."""
         recorded = np.stack([each.spectra / np.sqrt(each.variance) for each in self.observed])
         return np.asarray(recorded - self.residual)
+
+    def in_noise_of(self, other: WhitenedRun) -> FloatArray:
+        """Its residual in the standard deviations of the same run under another model.
+
+        Parameters
+        ----------
+        other : WhitenedRun
+        """
+        pairs = list(zip(self.observed, other.observed, strict=True))
+        if all(own is its for own, its in pairs):
+            return self.residual
+        return np.asarray(self.residual * np.stack([np.sqrt(own.variance / its.variance) for own, its in pairs]))
 
     @property
     def name(self) -> str:
@@ -58,10 +78,9 @@ class WhitenedRun:
 
 def whitened(
     model: DiagnosedModel,
-    runs: Sequence[Sequence[Observation]],
+    runs: Sequence[KnownRun],
     candidates: Sequence[Candidate],
     values: Mapping[str, float],
-    noise: Sequence[RunNoise],
     motions: DivergingMotions,
 ) -> list[WhitenedRun] | None:
     """Runs under a model; None where its simulation does not reach the end of each.
@@ -69,24 +88,22 @@ def whitened(
     Parameters
     ----------
     model : DiagnosedModel
-    runs : sequence of sequences of Observation
+    runs : sequence of KnownRun
+        Under this model.
     candidates : sequence of Candidate
         Effects of the model.
     values : mapping
         All numbers, those of single runs too.
-    noise : sequence of RunNoise
-        Per run.
     motions : DivergingMotions
     """
     extension, found = extension_of(candidates, values), []
-    for observed, of_run in zip(runs, noise, strict=True):
-        run = observed[0].run
+    for known in runs:
+        observed = known.observed
         names = [observation.channel for observation in observed]
         try:
-            readings = model.simulate(run, values, extension, names)
+            readings = model.simulate(observed[0].run, values, extension, names)
         except SloshlabError:
             return None
         residual = np.stack([each.residual(readings[each.channel]) for each in observed])
-        diverging = motions.differences(observed, candidates, values)
-        found.append(WhitenedRun(observed, residual, of_run, diverging))
+        found.append(WhitenedRun(known, residual, motions.differences(observed, candidates, values)))
     return found

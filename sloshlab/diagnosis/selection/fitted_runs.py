@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from math import ceil
@@ -14,7 +14,7 @@ from sloshlab.diagnosis.selection.missing_forces import latent_forces, missing_f
 from sloshlab.identification.diagnosed_model import DiagnosedModel
 from sloshlab.identification.effort import Effort
 from sloshlab.identification.free_run_fit import N_REFINED, fitted, fitted_baseline
-from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, run_of
+from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, faulty_channels, run_of
 from sloshlab.identification.observations import Observation, without_scatter
 from sloshlab.missing_physics.candidate import Candidate
 from sloshlab.missing_physics.prior import drawn
@@ -74,9 +74,16 @@ class FittedRuns:
         """Of all runs and channels."""
         return sum(observation.spectra.size for run in self.runs for observation in run)
 
-    def problem(self, candidates: Sequence[Candidate] = ()) -> FreeRunProblem:
-        """These runs with some effects."""
-        return FreeRunProblem(self.model, self.runs, candidates, effort=self.effort)
+    def problem(
+        self, candidates: Sequence[Candidate] = (), faulty: Collection[str] | None = None
+    ) -> FreeRunProblem:
+        """These runs with some effects, in the noise beside them or beside faults of other channels."""
+        return FreeRunProblem(self.model, self.runs, candidates, effort=self.effort, faulty=faulty)
+
+    def left_out(self, candidates: Sequence[Candidate]) -> frozenset[str]:
+        """Channels that do not drive beside some effects, as these say that they are faulty."""
+        drives = {name for run in self.runs for observation in run for name in observation.other_drives}
+        return faulty_channels(candidates) & drives
 
     def problem_of(self, fit: FreeRunFit) -> FreeRunProblem:
         """These runs with the effects of a fit."""

@@ -75,7 +75,8 @@ def hidden_effects(
     places = Places.beside(quiet, fit, of_quiet.residual(of_quiet.theta_of(fit.values)))
 
     def of_candidate(candidate: Candidate) -> tuple[dict[str, float], float] | None:
-        extended = runs.problem((*fit.candidates, candidate))
+        # In the noise of the baseline, about which its posterior is quadratic.
+        extended = runs.problem((*fit.candidates, candidate), problem.faulty)
         own = [i for i, name in enumerate(extended.names) if name.startswith(f"{candidate.key}.")]
         spacings = places_in_runs(extended, candidate)
         ranges = {prior.name: prior.high - prior.low for prior in candidate.prior}

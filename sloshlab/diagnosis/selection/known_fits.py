@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from sloshlab.diagnosis.inference.diverging_motions import DivergingMotions
+from sloshlab.diagnosis.inference.known_runs import KnownRun
 from sloshlab.diagnosis.inference.remainder import remainder
 from sloshlab.diagnosis.inference.run_noise import run_noise
 from sloshlab.diagnosis.inference.sampled_jumps import with_sampled_jumps
@@ -21,7 +22,7 @@ from sloshlab.diagnosis.selection.full_fit import at_its_optimum
 from sloshlab.diagnosis.selection.nested_models import keys_of
 from sloshlab.diagnosis.selection.successive_halving import HOPELESS_COST_RATIO, NO_CHANCE
 from sloshlab.identification.free_run_fit import inflated_cost
-from sloshlab.identification.free_run_problem import TEMPERING, FreeRunFit, huber_cost
+from sloshlab.identification.free_run_problem import TEMPERING, FreeRunFit
 from sloshlab.identification.observations import with_scatter_of_residuals
 
 N_KEPT: Final = 4
@@ -148,9 +149,10 @@ class KnownFits:
         ----------
         fit : FreeRunFit
         """
-        model, runs = self.runs.model, self.runs.runs
-        noise = [run_noise(model, run, fit.values) for run in runs]
-        residuals = whitened(model, runs, fit.candidates, fit.values, noise, self._motions)
+        model = self.runs.model
+        # No other model is compared, so that noise and transfers may be those of this one.
+        known = [KnownRun(run, run_noise(model, run, fit.values)) for run in self.runs.problem_of(fit).runs]
+        residuals = whitened(model, known, fit.candidates, fit.values, self._motions)
         if residuals is None:
             return True
         return is_worth_a_word(residuals) and remainder(residuals, tests=self.runs.tests).is_probable
@@ -210,7 +212,7 @@ class KnownFits:
 
         def hopeless_cost(inflation: float) -> float:
             of_nothing, of_best = (
-                huber_cost(problem.inflation_weights(inflation) * residual) + problem.prior_cost(theta, inflation)
+                problem.misfit(residual, inflation) + problem.prior_cost(theta, inflation)
                 for problem, theta, residual in left
             )
             allowed = of_best + chance + LAW**2 * max(of_nothing - of_best, 0.0)
@@ -244,7 +246,7 @@ class KnownFits:
         """
         problem = self._quiet.problem_of(fit)
         theta = problem.theta_of(fit.values)
-        of_itself = with_scatter_of_residuals(self._quiet.runs, problem.residual(theta))
+        of_itself = with_scatter_of_residuals(problem.runs, problem.residual(theta))
         own = FittedRuns(self._quiet.model, of_itself, self._quiet.tests, self._quiet.effort)
         refitted = at_its_optimum(own.problem_of(fit), fit.values)
         if refitted.trouble:
@@ -281,7 +283,7 @@ class KnownFits:
         self.runs = FittedRuns(quiet.model, renewed, quiet.tests, quiet.effort)
         for keys, fit in self._fits.items():
             problem = self.runs.problem_of(fit)
-            misfit = huber_cost(problem.residual(problem.theta_of(fit.values)))
+            misfit = problem.misfit(problem.residual(problem.theta_of(fit.values)))
             self._fits[keys] = replace(fit, misfit=misfit, cost=misfit + fit.cost - fit.misfit)
 
 

@@ -15,7 +15,7 @@ from sloshlab.diagnosis.selection.fitted_runs import DRAWS_PER_NUMBER, FittedRun
 from sloshlab.diagnosis.selection.missing_forces import latent_forces, missing_forces
 from sloshlab.diagnosis.surroundings import ACROSS_A_BAND, residual_peaks_hz
 from sloshlab.identification.block_jacobian import BlockJacobian
-from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, huber_cost
+from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.missing_force.latent_force import RunForces
 from sloshlab.missing_physics.candidate import Candidate, MissingForces
 from sloshlab.twin.lane_vector import N_LANES
@@ -63,7 +63,7 @@ class Proposal:
         Cost after one step, at each noise inflation of the search, over the least cost of a base there; last the
         cost of the start itself at the largest inflation.
     jacobian : BlockJacobian
-        Of the base.
+        Of the base, in the noise of the model.
     """
 
     candidates: tuple[Candidate, ...]
@@ -118,8 +118,7 @@ def proposals(
 
 def _cost(runs: FittedRuns, base: Base, inflation: float) -> float:
     problem = runs.problem_of(base.fit)
-    residual = problem.residual(problem.theta_of(base.fit.values))
-    return huber_cost(problem.inflation_weights(inflation) * residual)
+    return problem.misfit(problem.residual(problem.theta_of(base.fit.values)), inflation)
 
 
 def _beside(
@@ -132,17 +131,15 @@ def _beside(
     compared: Collection[str],
 ) -> list[Proposal]:
     problem = runs.problem_of(base.fit)
-    theta = problem.theta_of(base.fit.values)
-    residual = problem.residual(theta)
+    residual = problem.residual(problem.theta_of(base.fit.values))
     if not np.isfinite(residual).all():
         return []
-    tests = [
-        (inflation, ScoreTest(problem, theta, residual, base.jacobian, inflation), _cost(runs, base, inflation))
-        for inflation in least
-    ]
+    others = missing_from(base.fit, pool)
+    # Beside a fault of a sensor that drives the others do, whose noise is another one.
+    left_out = {candidate.key: runs.left_out((*base.fit.candidates, candidate)) for candidate in others}
+    tested = {names: _Tested.beside_faults(runs, base, names, tuple(least)) for names in set(left_out.values())}
     places = Places.beside(runs, base.fit, residual)
     first = next(iter(least))
-    first_weights = problem.inflation_weights(first)
 
     def of_candidate(candidate: Candidate) -> list[_Promise]:
         key = candidate.key
@@ -153,7 +150,7 @@ def _beside(
         thetas = [extended.theta_of({**base.fit.values, **start}) for start in sets]
         # The base is the extended model whose last effect has no size: a sensor changes its channel alone.
         own = [i for i, name in enumerate(extended.names) if name.startswith(f"{candidate.key}.")]
-        moved = zip(sets, extended.residuals_moved(thetas, own, residual), strict=True)
+        moved = zip(sets, extended.residuals_moved(thetas, own, tested[left_out[key]].residual), strict=True)
         found: list[_Promise] = []
         # As many as are simulated together, so that few residuals are held at once.
         while some := list(islice(moved, N_LANES)):
@@ -162,29 +159,66 @@ def _beside(
         return found
 
     def promised(candidate: Candidate, running: Sequence[tuple[dict[str, float], FloatArray]]) -> list[_Promise]:
-        changes = [at_start - residual for _, at_start in running]
-        gains = [test.gains(changes) for _, test, _ in tests] if changes else []
+        own = tested[left_out[candidate.key]]
+        changes = own.changes([at_start for _, at_start in running])
+        gains = [test.gains(changes) for test in own.tests] if changes else []
         found = []
         for i, (start, at_start) in enumerate(running):
             predicted = tuple(
                 (cost - of_test[i][0]) / max(least[inflation], 1e-300)
-                for (inflation, _, cost), of_test in zip(tests, gains, strict=True)
+                for inflation, cost, of_test in zip(least, own.costs, gains, strict=True)
             )
             # What no linear step reaches, such as a resonance that is off by many of its widths, shows as it is.
-            at_once = huber_cost(first_weights * at_start) / max(least[first], 1e-300)
+            at_once = own.problem.misfit(at_start, first) / max(least[first], 1e-300)
             factor = gains[int(np.argmin(predicted))][i][1]
             sized = candidate.sized(start, min(max(factor, 1.0 / _MOST_STEP), _MOST_STEP))
             found.append(({**base.fit.values, **sized}, (*predicted, at_once)))
         return found
 
-    others = missing_from(base.fit, pool)
     return [
-        Proposal((*base.fit.candidates, candidate), start, predicted, base.jacobian)
+        Proposal((*base.fit.candidates, candidate), start, predicted, tested[left_out[candidate.key]].jacobian)
         for candidate, found in zip(
             others, runs.effort.spent_on(runs.model.executor, of_candidate, others), strict=True
         )
         for start, predicted in found
     ]
+
+
+@dataclass(frozen=True, eq=False)
+class _Tested:
+    """A base beside faults of some sensors, with its score tests and costs by noise inflation."""
+
+    problem: FreeRunProblem
+    residual: FloatArray
+    jacobian: BlockJacobian
+    tests: list[ScoreTest]
+    costs: list[float]
+
+    @classmethod
+    def beside_faults(
+        cls, runs: FittedRuns, base: Base, left_out: frozenset[str], inflations: Sequence[float]
+    ) -> _Tested:
+        problem = runs.problem(base.fit.candidates, left_out)
+        theta = problem.theta_of(base.fit.values)
+        residual, jacobian = problem.residual(theta), base.jacobian
+        if left_out != runs.left_out(base.fit.candidates):
+            # A gain of a sensor moves the drive, or its own reading alone where others drive.
+            jacobian = problem.jacobian(theta, residual, range(theta.size))
+        compared = _comparable(problem, jacobian)
+        tests = [ScoreTest(problem, theta, problem.comparable(residual), compared, each) for each in inflations]
+        costs = [problem.misfit(residual, each) for each in inflations]
+        return cls(problem, residual, jacobian, tests, costs)
+
+    def changes(self, residuals: Sequence[FloatArray]) -> list[FloatArray]:
+        """Of the comparable residuals."""
+        return [self.problem.comparable(residual - self.residual) for residual in residuals]
+
+
+def _comparable(problem: FreeRunProblem, jacobian: BlockJacobian) -> BlockJacobian:
+    if not problem.is_otherwise_driven:
+        return jacobian
+    columns = [problem.comparable(jacobian.times(unit)) for unit in np.eye(jacobian.n_columns)]
+    return BlockJacobian.of_columns(columns, [each.spectra.size for run in problem.runs for each in run])
 
 
 def missing_from(fit: FreeRunFit, pool: Sequence[Candidate]) -> list[Candidate]:

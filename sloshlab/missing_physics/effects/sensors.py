@@ -486,7 +486,7 @@ def _cross_talk(numbers: Numbers, at: Surroundings, channel: str) -> Extension:
         return reading
 
     key = (f"sensor.cross_talk.{channel}", numbers["ratio"])
-    return Extension(faults=(SensorFault(to, leaked(1.0), leaked(-1.0), key),))
+    return Extension(faults=(SensorFault(to, leaked(1.0), leaked(-1.0), key, reads_others=True),))
 
 
 def _largest_leaks(at: Surroundings) -> Mapping[str, tuple[float, float]]:

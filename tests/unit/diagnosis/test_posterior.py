@@ -12,6 +12,7 @@ from scipy.integrate import quad
 
 from sloshlab.diagnosis.inference import posterior as posterior_module
 from sloshlab.diagnosis.inference.decision import decided
+from sloshlab.diagnosis.inference.known_runs import KnownRun
 from sloshlab.diagnosis.inference.posterior import posterior
 from sloshlab.diagnosis.inference.remainder import TEMPERING, Remainder
 from sloshlab.diagnosis.inference.run_noise import RunNoise
@@ -45,7 +46,7 @@ def model(
         for place, all_of_it in (places or {}).items()
     }
     alone = RunNoise(np.ones((1, 4, 1, 1)), {}, {})
-    runs = [WhitenedRun([], np.full((1, 1, 4), -total), alone)]
+    runs = [WhitenedRun(KnownRun([], alone), np.full((1, 1, 4), -total))]
     return ScoredModel(fit, values, runs, Remainder(by_cell, of_places), frozenset(), 0.0)
 
 

@@ -10,6 +10,7 @@ import pytest
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
+from sloshlab.diagnosis.inference.known_runs import KnownRun
 from sloshlab.diagnosis.inference.remainder import remainder
 from sloshlab.diagnosis.inference.run_noise import RunNoise
 from sloshlab.diagnosis.inference.scored_model import is_worth_a_word
@@ -49,7 +50,7 @@ def run(
         rows = np.broadcast_to((shown / np.linalg.norm(shown))[None], (*shape, 1, 2))
         places[place] = (rows, np.ones((*shape, 1)))
     noise = RunNoise(np.broadcast_to(root, (*shape, 2, 2)), places, dict.fromkeys(places, 0.01))
-    return WhitenedRun(cast(Any, observed), residual, noise)
+    return WhitenedRun(KnownRun(cast(Any, observed), noise), residual)
 
 
 def log_normal(x: np.ndarray, covariance: np.ndarray) -> float:

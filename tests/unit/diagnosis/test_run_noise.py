@@ -35,6 +35,9 @@ class OwnTwin:
     def motion(self, *request: Any) -> None:
         raise AnalysisError("twin", got="no end")
 
+    def driving(self, run: Any) -> tuple[str, ...]:
+        return ()
+
 
 OWN_TWIN = cast(Any, OwnTwin())
 

@@ -30,7 +30,7 @@ class Linear:
     def prior_weights(self, theta: np.ndarray, inflation: float) -> np.ndarray:
         return np.array([1.0] * self.n_baseline + [0.0] * (self.fixed.size - self.n_baseline))
 
-    def inflation_weights(self, share: float) -> np.ndarray:
+    def comparison_weights(self, share: float) -> np.ndarray:
         return np.full(N, self.soft)
 
     def at_bounds(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

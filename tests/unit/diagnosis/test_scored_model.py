@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 from recorded_oscillators import decays, effect, rig, surroundings
 
+from sloshlab.diagnosis.inference.known_runs import KnownRun
 from sloshlab.diagnosis.inference.scored_model import scored, strength
+from sloshlab.diagnosis.inference.whitened import WhitenedRun
 from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_physics import effects
@@ -25,8 +27,9 @@ def left_by(*channels: np.ndarray) -> Any:
     """A model that leaves these residuals in the channels of one run; the first half of it is informative."""
     informative = np.zeros(SHAPE, bool)
     informative[: SHAPE[0] // 2] = True
-    observed = [SimpleNamespace(informative=informative) for _ in channels]
-    return cast(Any, SimpleNamespace(runs=[SimpleNamespace(observed=observed, residual=list(channels))]))
+    observed = [SimpleNamespace(informative=informative, variance=np.ones(SHAPE)) for _ in channels]
+    run = WhitenedRun(KnownRun(cast(Any, observed), cast(Any, None)), np.stack(channels))
+    return cast(Any, SimpleNamespace(runs=[run]))
 
 
 def test_a_size_is_that_of_what_is_added_where_recordings_stand_out() -> None:
