@@ -13,7 +13,7 @@ from acquisition.numerical_tank.tank import Box, LiquidColumn
 from acquisition.two_phase_tank.setup import Fluids, GridNumerics, TwoPhaseSetup, Walls
 from acquisition.two_phase_tank.simulation import TwoPhaseTank
 
-MAGIC: Final = b"sloshlab two-phase tank checkpoint, version 2\n"
+MAGIC: Final = b"sloshlab two-phase tank checkpoint, version 3\n"
 _PARTS: Final[dict[str, Any]] = {
     "box": Box,
     "column": LiquidColumn,

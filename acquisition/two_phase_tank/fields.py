@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.two_phase_tank.contact_line import N_WALLS
 from acquisition.two_phase_tank.pressure import Pressure
 
 FloatArray = NDArray[np.float64]
@@ -29,6 +30,9 @@ class State(NamedTuple):
         Pressure of the last step [Pa]; where the search for the next one begins.
     roll : ndarray, shape (2,)
         Angle [rad] and rate [rad/s] of the tank, from x towards z.
+    lines : ndarray, shape (4, 2, max(nx, nz))
+        Places of contact lines that stick, in cells along floor, roof, left and right wall, with the gas beyond or
+        before the liquid, by the cell of the interface at the wall; `contact_line.NO_LINE` where none is.
     """
 
     c: FloatArray
@@ -36,6 +40,7 @@ class State(NamedTuple):
     w: FloatArray
     p: FloatArray
     roll: FloatArray
+    lines: FloatArray
 
 
 class Constants(NamedTuple):
@@ -58,6 +63,8 @@ class Constants(NamedTuple):
     cot_advancing, cot_receding : float
         Cotangents of the contact angles between which a contact line is free: slopes with which the liquid
         rises at a wall.
+    sticks : float
+        1 where a line between these angles stays where it is, 0 where it is free.
     courant : float
         Largest sum of the volumes that leave a cell in a step, over its volume.
     tolerance : float
@@ -78,6 +85,7 @@ class Constants(NamedTuple):
     slip: float
     cot_advancing: float
     cot_receding: float
+    sticks: float
     courant: float
     tolerance: float
 
@@ -117,6 +125,8 @@ class Work(NamedTuple):
         Changes of velocity by viscosity and walls.
     bx, bz : ndarray
         1/ρ on the faces.
+    lines : ndarray
+        As of the state, of the next step.
     """
 
     mx: FloatArray
@@ -148,6 +158,7 @@ class Work(NamedTuple):
     wv: FloatArray
     bx: FloatArray
     bz: FloatArray
+    lines: FloatArray
 
 
 class Flow(NamedTuple):
@@ -182,5 +193,6 @@ def room(nx: int, nz: int) -> Work:
     nx, nz : int
     """
     cells, along, up = (nx, nz), (nx + 1, nz), (nx, nz + 1)
-    shapes = [*[cells] * 9, *[along] * 3, *[up] * 3, *[along, up] * 7]
+    lines = (N_WALLS, 2, max(nx, nz))
+    shapes = [*[cells] * 9, *[along] * 3, *[up] * 3, *[along, up] * 7, lines]
     return Work(*(np.zeros(shape) for shape in shapes))

@@ -47,12 +47,15 @@ class Walls:
         down, 2 ρ ν/(δ b) per volume with δ = √(ν/πf) and b the depth (Stokes' oscillating plate); 0 is without.
     advancing_angle_deg, receding_angle_deg : float
         Contact angles between which the contact line is free; where both are equal it is the contact angle.
+    line_sticks : bool
+        Whether the contact line stays where it is between these angles (hysteresis) instead of being free.
     """
 
     hold: bool = True
     layer_frequency_hz: float = 0.0
     advancing_angle_deg: float = 90.0
     receding_angle_deg: float = 90.0
+    line_sticks: bool = False
 
 
 @dataclass(frozen=True)

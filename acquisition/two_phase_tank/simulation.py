@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from acquisition.numerical_tank.checkpoint_file import take_up
 from acquisition.numerical_tank.instability import InstabilityError
 from acquisition.two_phase_tank import energy, stepping
+from acquisition.two_phase_tank.contact_line import N_WALLS, NO_LINE
 from acquisition.two_phase_tank.energy import TwoPhaseAccount
 from acquisition.two_phase_tank.fields import Constants, Flow, State, room
 from acquisition.two_phase_tank.pressure import Pressure
@@ -77,6 +78,7 @@ class TwoPhaseTank:
             np.zeros((nx, nz + 1)),
             np.zeros((nx, nz)),
             np.zeros(2),
+            np.full((N_WALLS, 2, max(nx, nz)), NO_LINE),
         )
         self._work = room(nx, nz)
         self._sums = np.zeros(len(energy.TERMS))
@@ -119,6 +121,7 @@ class TwoPhaseTank:
         if given.shape != self._state.c.shape or not ((given >= 0) & (given <= 1)).all():
             raise InputError("liquid fraction", got=f"shape {given.shape}", allowed=allowed)
         self._state.c[:] = given
+        self._state.lines[:] = NO_LINE
         self.set_velocity(0.0, 0.0)
 
     def set_velocity(self, u_m_per_s: ArrayLike, w_m_per_s: ArrayLike) -> None:
@@ -287,6 +290,7 @@ def constants_of(setup: TwoPhaseSetup) -> Constants:
         0.0 if walls.hold else 1.0,
         1 / math.tan(math.radians(walls.advancing_angle_deg)),
         1 / math.tan(math.radians(walls.receding_angle_deg)),
+        1.0 if walls.line_sticks else 0.0,
         numerics.courant_number,
         numerics.tolerance,
     )

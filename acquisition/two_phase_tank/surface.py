@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from acquisition.two_phase_tank.contact_line import FLOOR, LEFT, NO_LINE, RIGHT, ROOF, slope_at_wall
 from acquisition.two_phase_tank.reconstruction import EMPTY, line_ends
 
 _REACH = 5
@@ -56,10 +57,11 @@ def _height(c, i, k, along_z, sign):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _curvature_of_heights(c, i, k, along_z, sign, dx, dz, cot_a, cot_r):  # type: ignore[no-untyped-def]
+def _curvature_of_heights(c, i, k, along_z, sign, k_, before, after):  # type: ignore[no-untyped-def]
     """κ from three heights, or `_UNKNOWN`."""
     nx, nz = c.shape
-    across, up = (dx, dz) if along_z else (dz, dx)
+    across, up = (k_.dx, k_.dz) if along_z else (k_.dz, k_.dx)
+    at = k if along_z else i
     ratio = across / up
     di, dk = (1, 0) if along_z else (0, 1)
     middle = _height(c, i, k, along_z, sign)
@@ -68,11 +70,13 @@ def _curvature_of_heights(c, i, k, along_z, sign, dx, dz, cot_a, cot_r):  # type
     left = _height(c, i - di, k - dk, along_z, sign) if has_left else 0.0
     if max(middle, left, right) >= _UNKNOWN:
         return _UNKNOWN
-    # behind a wall is the height that gives the contact angle; free between the angles, the line goes on as it is
+    # behind a wall is the height that gives the slope there
     if not has_right:
-        right = middle + min(max((middle - left) / ratio, cot_a), cot_r) * ratio
+        wall = RIGHT if along_z else ROOF
+        right = middle + slope_at_wall(k_, before, after, wall, at, sign, middle, left, ratio) * ratio
     if not has_left:
-        left = middle + min(max((middle - right) / ratio, cot_a), cot_r) * ratio
+        wall = LEFT if along_z else FLOOR
+        left = middle + slope_at_wall(k_, before, after, wall, at, sign, middle, right, ratio) * ratio
     slope = 0.5 * (right - left) / ratio
     bend = (right - 2.0 * middle + left) * up / (across * across)
     return -bend / (1.0 + slope * slope) ** 1.5
@@ -138,9 +142,13 @@ def is_interface(c, i, k):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def find_curvature(c, mx, mz, smooth, kappa, dx, dz, cot_advancing, cot_receding):  # type: ignore[no-untyped-def]
-    """κ of all cells of the interface, into an array that is unknown elsewhere."""
+def find_curvature(state, work, k_):  # type: ignore[no-untyped-def]
+    """κ of all cells of the interface, into an array that is unknown elsewhere; lines that stick are followed."""
+    c, mx, mz, smooth, kappa = state.c, work.mx, work.mz, work.smooth, work.kappa
     nx, nz = c.shape
+    dx, dz = k_.dx, k_.dz
+    if k_.sticks != 0.0:
+        work.lines[:] = NO_LINE
     _smooth(c, smooth)
     for i in range(nx):
         for k in range(nz):
@@ -154,13 +162,15 @@ def find_curvature(c, mx, mz, smooth, kappa, dx, dz, cot_advancing, cot_receding
             # along the steeper direction first
             for _ in range(2):
                 sign = 1 if (az if along_z else ax) > 0.0 else -1
-                found = _curvature_of_heights(c, i, k, along_z, sign, dx, dz, cot_advancing, cot_receding)
+                found = _curvature_of_heights(c, i, k, along_z, sign, k_, state.lines, work.lines)
                 if found < _UNKNOWN:
                     break
                 along_z = not along_z
             if found >= _UNKNOWN:
                 found = _curvature_of_normals(smooth, i, k, dx, dz)
             kappa[i, k] = min(max(found, -2.0 / dx), 2.0 / dx)
+    if k_.sticks != 0.0:
+        state.lines[:] = work.lines
 
 
 @njit(cache=True, error_model="numpy")
@@ -211,7 +221,7 @@ def interface_forces(state, work, body, k_):  # type: ignore[no-untyped-def]
     _find_places(c, work.mx, work.mz, work.alpha, ox, oz)
     kappa[:] = _UNKNOWN
     if sigma > 0.0:
-        find_curvature(c, work.mx, work.mz, work.smooth, kappa, dx, dz, k_.cot_advancing, k_.cot_receding)
+        find_curvature(state, work, k_)
     for i in range(1, nx):
         for k in range(nz):
             difference = c[i, k] - c[i - 1, k]

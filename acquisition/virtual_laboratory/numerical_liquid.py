@@ -17,7 +17,7 @@ from acquisition.numerical_tank.computed_force import PARTICLES, ComputedForce, 
 from acquisition.numerical_tank.instability import STOPPED
 from acquisition.numerical_tank.tank import Box, Liquid, TankSetup, filled_tank
 from acquisition.two_phase_tank.method import LIQUID_AND_GAS
-from acquisition.two_phase_tank.setup import Fluids, GridNumerics, TwoPhaseSetup, filled_two_phase_tank
+from acquisition.two_phase_tank.setup import Fluids, GridNumerics, TwoPhaseSetup, Walls, filled_two_phase_tank
 from acquisition.virtual_laboratory.tone_motion import TankMotion
 from sloshlab._version import __version__
 from sloshlab.errors import InputError
@@ -68,6 +68,7 @@ def two_phase_setup(
     seed: int,
     sampling_rate_hz: float,
     longest_step_s: float = GridNumerics().longest_step_s,
+    walls: Walls | None = None,
 ) -> TwoPhaseSetup:
     """The tank of liquid and gas of a rig.
 
@@ -83,6 +84,8 @@ def two_phase_setup(
         A whole number of steps makes a sample.
     longest_step_s : float
         Time step that is not exceeded.
+    walls : Walls, optional
+        By default they hold the fluids, and the contact angle is 90°.
 
     Raises
     ------
@@ -101,6 +104,7 @@ def two_phase_setup(
         liquid.fill_level,
         cells_per_height,
         fluids=fluids,
+        walls=walls,
         numerics=GridNumerics(longest_step_s=longest_step_s),
         seed=seed,
         sampling_rate_hz=sampling_rate_hz,
@@ -109,6 +113,11 @@ def two_phase_setup(
 
 def two_phase_attributes(setup: TwoPhaseSetup) -> dict[str, Any]:
     """Global attributes of a recording whose liquid was computed with its gas."""
+    walls = setup.walls
+    angles = {
+        "advancing_angle_deg": walls.advancing_angle_deg,
+        "receding_angle_deg": walls.receding_angle_deg,
+    }
     return {
         "liquid": "two_phase_tank",
         "cells_per_height": setup.cells_per_height,
@@ -116,6 +125,7 @@ def two_phase_attributes(setup: TwoPhaseSetup) -> dict[str, Any]:
         "viscosity_m2_per_s": setup.fluids.viscosity_m2_per_s,
         "surface_tension_n_per_m": setup.fluids.surface_tension_n_per_m,
         "gas_density_kg_per_m3": setup.fluids.gas_density_kg_per_m3,
+        **(angles if walls.line_sticks else {}),
         "seed": setup.seed,
         "sloshlab_version": __version__,
     }
@@ -151,6 +161,8 @@ class NumericalLiquid:
         Called with what was computed, the time that it took included.
     with_gas : bool
         Whether liquid and gas are computed on a grid; else the liquid alone as particles.
+    walls : Walls, optional
+        Of liquid and gas.
     """
 
     layers_per_height: int = 16
@@ -158,6 +170,7 @@ class NumericalLiquid:
     progress: Callable[[float], None] | None = None
     finished: Callable[[ComputedForce], None] | None = None
     with_gas: bool = False
+    walls: Walls | None = None
 
     def force_n(
         self, rig: Rig, motion: TankMotion, configuration: str, *, sampling_rate_hz: float, seed: int
@@ -209,7 +222,11 @@ class NumericalLiquid:
         """What is computed, how, and what the recording says of it."""
         if self.with_gas:
             both = two_phase_setup(
-                rig, cells_per_height=self.layers_per_height, seed=seed, sampling_rate_hz=rate_hz
+                rig,
+                cells_per_height=self.layers_per_height,
+                seed=seed,
+                sampling_rate_hz=rate_hz,
+                walls=self.walls,
             )
             return both, LIQUID_AND_GAS, two_phase_attributes(both)
         setup = numerical_setup(rig, layers_per_height=self.layers_per_height, seed=seed, sampling_rate_hz=rate_hz)

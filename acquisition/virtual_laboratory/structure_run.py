@@ -264,7 +264,12 @@ def _setup(
         GridNumerics().longest_step_s,
     )
     return two_phase_setup(
-        rig, cells_per_height=finely, seed=seed, sampling_rate_hz=sampling_rate_hz, longest_step_s=longest_s
+        rig,
+        cells_per_height=finely,
+        seed=seed,
+        sampling_rate_hz=sampling_rate_hz,
+        longest_step_s=longest_s,
+        walls=numerical.walls,
     )
 
 

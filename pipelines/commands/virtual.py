@@ -95,6 +95,14 @@ def virtual(
         ),
     ] = "law",
     layers: Annotated[int, typer.Option(help="Layers of particles, or cells, over the height of the tank.")] = 16,
+    contact_angles: Annotated[
+        str,
+        typer.Option(
+            metavar="ADVANCING,RECEDING",
+            help="Degrees between which the contact line of liquid and gas sticks.",
+            show_default=False,
+        ),
+    ] = "",
     checkpoint: Annotated[
         Path | None,
         typer.Option(
@@ -164,6 +172,7 @@ def virtual(
         rms_g=rms_g,
         second_frequency_hz=second_frequency_hz,
         laboratory_seed=of_laboratory,
+        contact_angles=contact_angles,
     )
     made = (
         _repeats_made(

@@ -26,6 +26,7 @@ def virtual_run(
     laboratory_seed: int | None = None,
     liquid: str = "law",
     layers: int = 16,
+    contact_angles: str = "",
 ) -> xr.Dataset:
     """Make a run of the virtual laboratory; of the options it takes those that the experiment has.
 
@@ -52,10 +53,12 @@ def virtual_run(
         Of noise, drive and liquid; runs of several seeds are repeats on one rig.
     laboratory_seed : int, optional
         Which laboratory is drawn, with masses, gains and frequencies a little off; by default the rig as told.
-    liquid : {"law", "numerical"}
-        ``numerical`` is computed, which takes long; on a structure it always is.
+    liquid : {"law", "numerical", "two_phase"}
+        ``numerical`` and ``two_phase`` are computed, which takes long; on a structure it always is.
     layers : int
-        Layers of particles over the height of the tank, of a computed liquid.
+        Layers of particles, or cells, over the height of the tank, of a computed liquid.
+    contact_angles : str
+        Advancing and receding angle [°], such as ``"80,50"``, between which the line of ``two_phase`` sticks.
 
     Returns
     -------
@@ -83,5 +86,6 @@ def virtual_run(
         rms_g=rms_g,
         second_frequency_hz=second_frequency_hz,
         laboratory_seed=laboratory_seed,
+        contact_angles=contact_angles,
     )
     return virtual_recording(run, rig_source(rig))

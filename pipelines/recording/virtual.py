@@ -32,6 +32,7 @@ from sloshlab.registry import loaded
 from sloshlab.rig import Rig
 
 if TYPE_CHECKING:  # the compiled loops of a computed liquid take a second to load: only where it is computed
+    from acquisition.two_phase_tank.setup import Walls
     from acquisition.virtual_laboratory.numerical_campaign import FinishedRun
     from acquisition.virtual_laboratory.numerical_campaign_tasks import CampaignSettings
     from acquisition.virtual_laboratory.numerical_liquid import NumericalLiquid
@@ -55,7 +56,8 @@ def virtual_experiments() -> tuple[str, ...]:
 class VirtualRun:
     """What the virtual laboratory is asked to do; of the options it takes those that the experiment has.
 
-    Without `laboratory_seed` the rig is as told.
+    Without `laboratory_seed` the rig is as told. `contact_angles` are degrees as ``ADVANCING,RECEDING``, between
+    which the contact line sticks; empty for 90° without sticking.
     """
 
     experiment: str
@@ -73,6 +75,7 @@ class VirtualRun:
     rms_g: float
     second_frequency_hz: float = 14.7
     laboratory_seed: int | None = None
+    contact_angles: str = ""
 
     def settings(self) -> dict[str, Any]:
         """Arguments of the laboratory's own function."""
@@ -198,6 +201,7 @@ def _check_run(run: VirtualRun) -> None:
         allowed = (*virtual_experiments(), CAMPAIGN)
         raise InputError("EXPERIMENT", got=repr(run.experiment), allowed=", ".join(allowed))
     _check_liquid(run.liquid)
+    _sticking_walls(run)
 
 
 def _computed(run: VirtualRun, rig: RigSource, saved: Path) -> xr.Dataset:
@@ -213,8 +217,28 @@ def _computed(run: VirtualRun, rig: RigSource, saved: Path) -> xr.Dataset:
             saved,
             lambda share: advance(round(1000 * share), 1000),
             with_gas=run.liquid == "two_phase",
+            walls=_sticking_walls(run),
         )
         return _recorded(run, rig, numerical)
+
+
+def _sticking_walls(run: VirtualRun) -> Walls | None:
+    """Walls at which the contact line sticks between two angles; None if that is not asked for."""
+    if not run.contact_angles:
+        return None
+    from acquisition.two_phase_tank.setup import Walls
+
+    if run.liquid != "two_phase":
+        raise InputError("--contact-angles", got=f"with --liquid {run.liquid}", allowed="--liquid two_phase")
+    allowed = "advancing and receding angle in degrees, 5 ≤ receding ≤ advancing ≤ 175, such as 80,50"
+    try:
+        advancing, receding = (float(part) for part in run.contact_angles.split(","))
+    except ValueError as error:
+        raise InputError("--contact-angles", got=repr(run.contact_angles), allowed=allowed) from error
+    # not a number is in no range
+    if not 5.0 <= receding <= advancing <= 175.0:
+        raise InputError("--contact-angles", got=repr(run.contact_angles), allowed=allowed)
+    return Walls(advancing_angle_deg=advancing, receding_angle_deg=receding, line_sticks=True)
 
 
 def _recorded(run: VirtualRun, rig: RigSource, computed: NumericalLiquid | None) -> xr.Dataset:

@@ -211,6 +211,55 @@ def drop(cells_per_height: int, n_periods: float = 2.0) -> list[Finding]:
     return [Finding(name, "ω / √(6σ/((ρ₁ + ρ₂)R³))", measured / omega, 1.0, 0.02)]
 
 
+def stuck_drop(cells_per_height: int) -> list[Finding]:
+    """Pull a drop on the floor along it: its line holds as long as Δρ A a < σ (cos θ_r − cos θ_a) (Furmidge 1962).
+
+    In the plane that is the balance of forces on the drop. Beyond, what is left accelerates it, and two pulls tell
+    where that begins.
+
+    Parameters
+    ----------
+    cells_per_height : int
+        Of the box of 12.5 mm; the drop is a half circle of 5 mm at the start.
+    """
+    held, *sliding = (_drop_pulled(cells_per_height, share) for share in (0.8, 1.25, 1.5))
+    slope = (sliding[1][1] - sliding[0][1]) / 0.25
+    name = f"drop on the floor, 100° and 60°, {0.4 * cells_per_height:g} cells per radius"
+    unit_m_per_s = math.sqrt(Fluids().surface_tension_n_per_m / (Fluids().density_kg_per_m3 * 0.005))
+    return [
+        Finding(name, "pulled by 0.8: speed at the end / √(σ/(ρR))", held[0] / unit_m_per_s, 0.0, 0.01),
+        Finding(name, "slides from Δρ A a / (σ (cos θ_r − cos θ_a)) on", 1.25 - sliding[0][1] / slope, 1.0, 0.05),
+        Finding(name, "its acceleration / what the line leaves over", slope, 1.0, 0.05),
+    ]
+
+
+def _drop_pulled(cells_per_height: int, share: float) -> tuple[float, float]:
+    """Speed [m/s] at the end, and acceleration over that which the line holds, of a drop pulled to the right."""
+    box, radius_m, rise_s, held_s = Box(0.08, 0.0125), 0.005, 0.2, 0.25
+    fluids = Fluids(viscosity_m2_per_s=1e-5)
+    walls = Walls(hold=False, advancing_angle_deg=100.0, receding_angle_deg=60.0, line_sticks=True)
+    setup = TwoPhaseSetup(
+        box, LiquidColumn(0.01, 0.005), cells_per_height, fluids, walls, _STILL, gravity_m_per_s2=0.0
+    )
+    tank, (nx, nz) = TwoPhaseTank(setup), (setup.n_along, setup.n_up)
+    x = (np.arange(10 * nx) + 0.5) / (10 * nx) * box.length_m - 0.025
+    z = (np.arange(10 * nz) + 0.5) / (10 * nz) * box.height_m
+    inside = np.hypot(x[:, None], z[None, :]) < radius_m
+    tank.set_fractions(inside.reshape(nx, 10, nz, 10).mean(axis=(1, 3)))
+    lighter = fluids.density_kg_per_m3 - fluids.gas_density_kg_per_m3
+    angles = math.cos(math.radians(60.0)) - math.cos(math.radians(100.0))
+    holds = fluids.surface_tension_n_per_m * angles / (lighter * tank.liquid_volume_m2())
+    times_s = tank.times_s(round((rise_s + held_s) / setup.step_s))
+    places = []
+    for pull in share * holds * np.minimum(times_s / rise_s, 1.0):
+        tank.advance([[-pull, 0.0]])
+        places.append(float((tank.liquid_fraction.sum(axis=1) * (np.arange(nx) + 0.5)).sum()))
+    course_m = np.array(places) / tank.liquid_fraction.sum() * setup.cell_m[0]
+    used = times_s > rise_s + 0.1 * held_s
+    fit = np.polyfit(times_s[used] - times_s[-1], course_m[used], 2)
+    return float(fit[1]), float(2 * fit[0] / holds)
+
+
 def dam_break(cells_per_height: int) -> list[Finding]:
     """Let a column collapse; its front reaches the wall at t √(g/H) ≈ 2.4 (Lobovský et al. 2014).
 

@@ -8,7 +8,14 @@ from typing import Final
 
 from studies.numerical_tank_verification.verification import verified
 from studies.numerical_tank_verification.verification_cases import Finding
-from studies.two_phase_verification.cases import dam_break, drop, faraday_threshold, rest, standing_wave
+from studies.two_phase_verification.cases import (
+    dam_break,
+    drop,
+    faraday_threshold,
+    rest,
+    standing_wave,
+    stuck_drop,
+)
 
 QUICK: Final[tuple[Callable[[], list[Finding]], ...]] = (
     lambda: rest(12, 60.0),
@@ -19,6 +26,7 @@ QUICK: Final[tuple[Callable[[], list[Finding]], ...]] = (
     lambda: standing_wave(32, mode=2),
     lambda: drop(20),
     lambda: drop(40),
+    lambda: stuck_drop(20),
     lambda: faraday_threshold(24),
     lambda: faraday_threshold(32),
     lambda: dam_break(24),
@@ -28,6 +36,7 @@ LONG: Final[tuple[Callable[[], list[Finding]], ...]] = (
     lambda: rest(24, 60.0),
     lambda: standing_wave(48),
     lambda: drop(64),
+    lambda: stuck_drop(30),
     lambda: faraday_threshold(40),
     lambda: dam_break(48),
 )

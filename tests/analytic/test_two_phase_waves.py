@@ -60,3 +60,31 @@ def test_drop_oscillates_as_lamb_says() -> None:
     assert math.pi / np.diff(at).mean() == pytest.approx(omega, rel=0.02)
     volume = float(tank.liquid_fraction.sum()) * (side / n) ** 2
     assert volume == pytest.approx(inside.mean() * side**2, rel=1e-9)
+
+
+@pytest.mark.parametrize(("share", "slides"), [(0.8, False), (1.5, True)])
+def test_drop_that_sticks_is_held_up_to_the_difference_of_its_angles(share: float, slides: bool) -> None:
+    """In the plane m x'' = (ρ − ρ') A a − σ (cos θ_r − cos θ_a), Furmidge 1962; below that it hangs still."""
+    nx, nz, length, height, R = 128, 20, 0.08, 0.0125, 0.005
+    theta_a, theta_r = math.radians(100), math.radians(60)
+    walls = Walls(hold=False, advancing_angle_deg=100, receding_angle_deg=60, line_sticks=True)
+    fluids, column = Fluids(viscosity_m2_per_s=1e-5), LiquidColumn(0.01, 0.005)
+    setup = TwoPhaseSetup(Box(length, height), column, nz, fluids, walls, STILL, gravity_m_per_s2=0.0)
+    tank = TwoPhaseTank(setup)
+    x = ((np.arange(8 * nx) + 0.5) / (8 * nx) - 0.7) * length
+    z = (np.arange(8 * nz) + 0.5) / (8 * nz) * height
+    tank.set_fractions((np.hypot(x[:, None], z) < R).reshape(nx, 8, nz, 8).mean(axis=(1, 3)))
+    area = math.pi * R**2 / 2
+    a = share * sigma * (math.cos(theta_r) - math.cos(theta_a)) / ((rho - rho_gas) * area)
+    times, places = tank.times_s(round(0.4 / setup.step_s)), []
+    for pull in a * np.minimum(times / 0.2, 1):
+        # the tank goes to the right, the drop to the left
+        tank.advance([[pull, 0.0]])
+        places.append(float(tank.liquid_fraction.sum(axis=1) @ np.arange(nx)) / tank.liquid_fraction.sum())
+    course = -np.array(places) * length / nx
+    late = times > 0.25
+    acceleration, speed = np.polyfit(times[late] - times[-1], course[late], 2)[:2] * (2, 1)
+    expected = (share - 1) / share * a if slides else 0.0
+    # the drop still swings a little about its new shape
+    assert acceleration == pytest.approx(expected, abs=0.05 * a)
+    assert speed == pytest.approx(0.0, abs=0.005) if not slides else speed > 0.05

@@ -36,3 +36,35 @@ def test_grids_that_cannot_be_are_refused(tmp_path: Path, capsys: Any, layers: s
     command = ["virtual", "shaker_sweep", "--rig", str(tmp_path / "rig.toml"), "--liquid", "two_phase"]
     output = tmp_path / "run.nc"
     refusal(capsys, [*command, "--layers", layers, "--duration-s", "5", "-o", str(output)], output, told)
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        (["--liquid", "two_phase", "--contact-angles", "50,80"], "receding ≤ advancing"),
+        (["--liquid", "two_phase", "--contact-angles", "nan,nan"], "receding ≤ advancing"),
+        (["--liquid", "two_phase", "--contact-angles", "80"], "advancing and receding angle"),
+        (["--liquid", "numerical", "--contact-angles", "80,50"], "--liquid two_phase"),
+    ],
+)
+def test_contact_angles_that_cannot_be_are_refused(
+    tmp_path: Path, capsys: Any, more: list[str], told: str
+) -> None:
+    (tmp_path / "rig.toml").write_text(rig_text(0.5), encoding="utf-8")
+    output = tmp_path / "run.nc"
+    command = ["virtual", "shaker_sweep", "--rig", str(tmp_path / "rig.toml"), "--duration-s", "5", *more]
+    refusal(capsys, [*command, "-o", str(output)], output, told)
+
+
+def test_contact_angles_reach_the_computed_liquid(tmp_path: Path) -> None:
+    (tmp_path / "rig.toml").write_text(RIG_TEXTS[SDOF_RIG], encoding="utf-8")
+    command = ["virtual", "sdof_free", "--rig", str(tmp_path / "rig.toml"), "--liquid", "two_phase"]
+    command += ["--layers", "8", "--duration-s", "0.2"]
+    forces = []
+    for name, more in (("free", []), ("sticks", ["--contact-angles", "80,50"])):
+        assert run_command([*command, *more, "-o", str(tmp_path / f"{name}.nc")]) == 0
+        run = read_recording(tmp_path / f"{name}.nc")
+        angles = [run.attrs.get(f"{which}_angle_deg") for which in ("advancing", "receding")]
+        assert angles == ([80.0, 50.0] if more else [None, None])
+        forces.append(run["acceleration_tip"].to_numpy())
+    assert np.abs(forces[1] - forces[0]).max() > 0

@@ -8,6 +8,7 @@ import pytest
 from acquisition.numerical_tank.instability import InstabilityError
 from acquisition.numerical_tank.tank import Box
 from acquisition.two_phase_tank import checkpoint
+from acquisition.two_phase_tank.contact_line import NO_LINE
 from acquisition.two_phase_tank.setup import Fluids, GridNumerics, TwoPhaseSetup, Walls, filled_two_phase_tank
 from acquisition.two_phase_tank.simulation import TwoPhaseTank
 from sloshlab.errors import InputError
@@ -129,6 +130,35 @@ def test_restart_reaches_the_same_bytes(tmp_path: Path, stop: int) -> None:
     checkpoint.save(again, tmp_path / "again")
     checkpoint.save(through, tmp_path / "through")
     assert (tmp_path / "again").read_bytes() == (tmp_path / "through").read_bytes()
+
+
+def test_lines_that_stick_are_part_of_what_is_continued(tmp_path: Path) -> None:
+    walls = Walls(advancing_angle_deg=110.0, receding_angle_deg=60.0, line_sticks=True)
+    setup = filled_two_phase_tank(SETUP.box, 0.5, 12, seed=3, numerics=SETUP.numerics, walls=walls)
+    through, motion = shaken(setup, 120)
+    through.advance(motion)
+    first, _ = shaken(setup)
+    first.advance(motion[:77])
+    checkpoint.save(first, tmp_path / "tank.checkpoint")
+    again = checkpoint.load(tmp_path / "tank.checkpoint")
+    again.advance(motion[77:])
+    assert again.liquid_fraction.tobytes() == through.liquid_fraction.tobytes()
+    # without the places of the lines the liquid would go on otherwise
+    lost = checkpoint.load(tmp_path / "tank.checkpoint")
+    lost.restore({**lost.checkpoint_arrays(), "state_lines": np.full((4, 2, 24), NO_LINE)})
+    lost.advance(motion[77:])
+    assert lost.liquid_fraction.tobytes() != through.liquid_fraction.tobytes()
+
+
+def test_a_line_with_one_angle_sticks_nowhere() -> None:
+    """Between equal angles nothing is left to stick: the same bytes as with a contact angle alone."""
+    ends = []
+    for sticks in (False, True):
+        walls = Walls(advancing_angle_deg=70.0, receding_angle_deg=70.0, line_sticks=sticks)
+        tank, motion = shaken(filled_two_phase_tank(SETUP.box, 0.5, 12, numerics=SETUP.numerics, walls=walls), 60)
+        tank.advance(motion)
+        ends.append(tank.liquid_fraction.tobytes())
+    assert ends[0] == ends[1]
 
 
 def test_a_damaged_checkpoint_or_one_of_another_tank_is_refused(tmp_path: Path) -> None:
