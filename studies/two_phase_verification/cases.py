@@ -212,10 +212,10 @@ def drop(cells_per_height: int, n_periods: float = 2.0) -> list[Finding]:
 
 
 def stuck_drop(cells_per_height: int) -> list[Finding]:
-    """Pull a drop on the floor along it: its line holds as long as Δρ A a < σ (cos θ_r − cos θ_a) (Furmidge 1962).
+    """Pull a drop along the floor: its line holds as long as Δρ A a < σ (cos θ_r − cos θ_a) (Furmidge 1962).
 
-    In the plane that is the balance of forces on the drop. Beyond, what is left accelerates it, and two pulls tell
-    where that begins.
+    In the plane that is the balance of forces on the drop; the angles are 60° and 100°. Beyond, what is left
+    accelerates it, and two pulls tell where that begins.
 
     Parameters
     ----------
@@ -224,12 +224,12 @@ def stuck_drop(cells_per_height: int) -> list[Finding]:
     """
     held, *sliding = (_drop_pulled(cells_per_height, share) for share in (0.8, 1.25, 1.5))
     slope = (sliding[1][1] - sliding[0][1]) / 0.25
-    name = f"drop on the floor, 100° and 60°, {0.4 * cells_per_height:g} cells per radius"
+    name = f"drop that sticks, {0.4 * cells_per_height:g} cells per radius"
     unit_m_per_s = math.sqrt(Fluids().surface_tension_n_per_m / (Fluids().density_kg_per_m3 * 0.005))
     return [
-        Finding(name, "pulled by 0.8: speed at the end / √(σ/(ρR))", held[0] / unit_m_per_s, 0.0, 0.01),
-        Finding(name, "slides from Δρ A a / (σ (cos θ_r − cos θ_a)) on", 1.25 - sliding[0][1] / slope, 1.0, 0.05),
-        Finding(name, "its acceleration / what the line leaves over", slope, 1.0, 0.05),
+        Finding(name, "pulled by 0.8: speed / √(σ/(ρR))", held[0] / unit_m_per_s, 0.0, 0.01),
+        Finding(name, "threshold Δρ A a / (σ (cos θ_r − cos θ_a))", 1.25 - sliding[0][1] / slope, 1.0, 0.05),
+        Finding(name, "acceleration / what the line leaves", slope, 1.0, 0.05),
     ]
 
 
