@@ -29,6 +29,9 @@ TANK: Final = Box(0.1172, 0.0272, 0.078)
 RISE_CYCLES: Final = 3
 
 
+_LATER: Final = ("advancing_angle_deg", "receding_angle_deg", "line_sticks")
+
+
 @dataclass(frozen=True)
 class Shaking:
     """One motion of the tank, and how it is computed.
@@ -46,6 +49,9 @@ class Shaking:
         Whether the walls in the plane hold the fluids.
     seed : int
     gas_density_kg_per_m3 : float
+    advancing_angle_deg, receding_angle_deg : float
+    line_sticks : bool
+        Contact line, as of `Walls`.
     """
 
     acceleration_g: float
@@ -57,11 +63,17 @@ class Shaking:
     hold: bool = True
     seed: int = 0
     gas_density_kg_per_m3: float = Fluids().gas_density_kg_per_m3
+    advancing_angle_deg: float = Walls().advancing_angle_deg
+    receding_angle_deg: float = Walls().receding_angle_deg
+    line_sticks: bool = False
 
     @property
     def name(self) -> str:
         """One that no other has."""
-        return ", ".join(f"{key}={value:g}" for key, value in asdict(self).items())
+        usual = asdict(Shaking(0.0, 0.0))
+        # what came after results were kept is told only where it is not as usual, so that they are still found
+        told = ((key, value) for key, value in asdict(self).items() if key not in _LATER or value != usual[key])
+        return ", ".join(f"{key}={value:g}" for key, value in told)
 
     @property
     def differs(self) -> str:
@@ -131,7 +143,13 @@ def shaken(case: Shaking) -> Shaken:
         fluids=Fluids(
             surface_tension_n_per_m=case.surface_tension_n_per_m, gas_density_kg_per_m3=case.gas_density_kg_per_m3
         ),
-        walls=Walls(hold=case.hold, layer_frequency_hz=case.layer_frequency_hz),
+        walls=Walls(
+            hold=case.hold,
+            layer_frequency_hz=case.layer_frequency_hz,
+            advancing_angle_deg=case.advancing_angle_deg,
+            receding_angle_deg=case.receding_angle_deg,
+            line_sticks=case.line_sticks,
+        ),
         seed=case.seed,
     )
     tank, period, omega = TwoPhaseTank(setup), 1 / case.frequency_hz, 2 * math.pi * case.frequency_hz

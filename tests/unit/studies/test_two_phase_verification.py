@@ -10,7 +10,16 @@ import xarray as xr
 import studies.two_phase_verification as room
 from acquisition.numerical_tank.carried_tank import StructureHistory
 from acquisition.two_phase_tank.setup import Fluids
-from studies.two_phase_verification import cases, maps, release, shaken
+from studies.tank_reference.points import BEAM_POINT
+from studies.two_phase_verification import (
+    cases,
+    effects,
+    effects_picture,
+    effects_tables,
+    maps,
+    release,
+    shaken,
+)
 from studies.two_phase_verification.linear_theory import Layers
 
 KEPT = Path(room.__file__).with_name("shaken.json")
@@ -135,3 +144,78 @@ def test_kept_releases_are_of_their_cases_and_their_accounts_close() -> None:
         assert found["works_j"][0] < 0.1 * max(found["works_j"])
     lines = release.rows(kept)
     assert lines[2].startswith("| 16 | 0.25 ms | 0.3 ± 0.0 | 10.2 ± 1.6 |")
+
+
+def shaken_with(
+    effects_told: dict[str, float], pairs_told: dict[tuple[str, ...], float]
+) -> dict[str, dict[str, float]]:
+    """Results of three starts, 0.1 apart, of W̄ = 1 plus what every effect adds; pairs add what is told besides."""
+    kept: dict[str, dict[str, float]] = {}
+    for point in effects.MEASURED_POINTS:
+        for names in effects.combinations():
+            w_bar = 1.0 + sum(effects_told.get(name, 0.0) for name in names) + pairs_told.get(names, 0.0)
+            for seed in range(3):
+                kept[effects.case_of(point, names, seed).name] = {"w_bar": w_bar + 0.1 * (seed - 1), "beta": -0.2}
+    return kept
+
+
+def test_every_combination_is_computed_once_and_changes_what_it_names() -> None:
+    combinations = effects.combinations()
+    n = len(effects.EFFECTS)
+    assert len(set(combinations)) == len(combinations) == 1 + n + n * (n - 1) // 2 - len(effects.WITHOUT_MEANING)
+    cases_planned = effects.planned()
+    assert (
+        len({case.name for case in cases_planned})
+        == len(cases_planned)
+        == 9 * len(combinations) + 3 * len(effects.FOLLOWED_LONGER)
+    )
+    both = effects.case_of(BEAM_POINT, ("σ = 0", "h/24"), 2)
+    assert (both.surface_tension_n_per_m, both.cells_per_height, both.seed, both.hold) == (0.0, 24, 2, True)
+    stuck = effects.case_of(BEAM_POINT, ("line sticks",), 0)
+    assert (stuck.advancing_angle_deg, stuck.receding_angle_deg, stuck.line_sticks) == (80.0, 50.0, True)
+
+
+def test_means_over_starts_have_the_pooled_error_and_pairs_what_both_do_not_tell() -> None:
+    """Starts at −0.1, 0, 0.1: standard deviation 0.1, of a mean of three 0.1/√3, of four such means 0.2/√3."""
+    pair = ("walls slip", "light gas")
+    kept = shaken_with({"walls slip": 0.3, "light gas": -0.2}, {pair: 0.5})
+    found = effects_tables.liquids(kept)
+    value = found[pair][BEAM_POINT].w_bar
+    assert (value.value, value.standard_error) == pytest.approx((1.6, 0.1 / 3**0.5))
+    told = {(item.names, item.point): item for item in effects_tables.interactions(found)}
+    assert told[pair, BEAM_POINT].w_bar.value == pytest.approx(0.5)
+    assert told[pair, BEAM_POINT].in_errors == pytest.approx(0.5 / (0.2 / 3**0.5))
+    others = [item.w_bar.value for key, item in told.items() if key[0] != pair]
+    assert others == pytest.approx([0.0] * len(others), abs=1e-12)
+    changed = {(names, point) for names, point, _ in effects_tables.beyond_chance(found)}
+    # 2 √2 0.1/√3 = 0.163 is two standard errors of a difference
+    assert ((pair, BEAM_POINT)) in changed
+    assert all(set(names) & set(pair) for names, _ in changed)
+    assert effects_picture.changes(found, BEAM_POINT)[3, 1] == pytest.approx(0.6)
+
+
+def test_a_change_that_meets_all_three_points_is_named() -> None:
+    """0 at 0.5 g and 1.65 at 4 g may choose; 1.38 at the beam's point judges."""
+    kept = shaken_with({}, {})
+    right = ("walls slip", "h/24")
+    for point, w_bar in zip(effects.MEASURED_POINTS, (0.0, 1.65, 1.38), strict=True):
+        for seed in range(3):
+            kept[effects.case_of(point, right, seed).name] = {"w_bar": w_bar + 0.1 * (seed - 1), "beta": -0.2}
+    found = effects_tables.liquids(kept)
+    assert effects_tables.judged(found).names == ("walls slip + h/24",)
+    assert effects_tables.judged(found).answer == "named"
+    assert effects_tables.facts_met(found[right]) == 6
+    assert effects_tables.judged(effects_tables.liquids(shaken_with({}, {}))).answer == "unknown"
+
+
+def test_kept_effects_are_those_that_the_page_tells() -> None:
+    kept = json.loads(effects.KEPT.read_text(encoding="utf-8"))
+    for name, found in kept.items():
+        assert shaken.Shaking(**found["case"]).name == name
+        assert abs(found["volume_change"]) < 1e-9
+    assert set(kept) <= {case.name for case in effects.planned()}
+    told = effects_tables.tables(kept)
+    page = (Path(room.__file__).parents[2] / "docs" / "what_our_tank_left_out.md").read_text(encoding="utf-8")
+    for line in told:
+        if line.startswith("|"):
+            assert line in page
