@@ -13,6 +13,7 @@ import xarray as xr
 
 from studies.measured_facts.laboratory import FACTS, FILLING_LEVEL
 from studies.measured_facts.table import Results
+from studies.steady_state import MeanOverCycles
 from studies.tank_reference.interfoam_case import InterfoamCase
 from studies.tank_reference.kept_results import KeptResult
 from studies.tank_reference.particle_runs import ParticleCase, ParticleResult, counted
@@ -26,7 +27,6 @@ from studies.tank_reference.planned_cases import (
     cycles_at,
 )
 from studies.tank_reference.points import BEAM_POINT, BOX, COMMON_POINTS, WATER_DENSITY_KG_PER_M3, DrivenPoint
-from studies.tank_reference.steady_state import MeanOverCycles
 
 POINTS: Final = (*COMMON_POINTS, BEAM_POINT)
 STIFF_M_PER_S: Final = 20.0

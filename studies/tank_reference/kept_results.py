@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from sloshlab import atomic_file
 from sloshlab.errors import InputError
+from studies.steady_state import MeanOverCycles, mean_over_cycles
 from studies.tank_reference.interfoam_case import InterfoamCase, inputs_hash
 from studies.tank_reference.interfoam_readings import Reading, waiting_cycles
 from studies.tank_reference.points import DrivenPoint
-from studies.tank_reference.steady_state import MeanOverCycles, mean_over_cycles
 
 FloatArray = NDArray[np.float64]
 

@@ -17,10 +17,10 @@ from acquisition.numerical_tank.simulation import NumericalTank
 from acquisition.numerical_tank.tank import Liquid, TankSetup, filled_tank
 from sloshlab import atomic_file
 from sloshlab.errors import InputError
+from studies.steady_state import MeanOverCycles, mean_over_cycles
 from studies.tank_reference.interfoam_readings import waiting_cycles
 from studies.tank_reference.planned_cases import VARIED_POINTS, cycles_at
 from studies.tank_reference.points import BEAM_POINT, BOX, COMMON_POINTS, FILLING_LEVEL, RISE_CYCLES, DrivenPoint
-from studies.tank_reference.steady_state import MeanOverCycles, mean_over_cycles
 from studies.tank_scaling.harmonic_runs import cycles_of
 
 KEPT: Final = Path(__file__).with_name("particles.json")

@@ -11,9 +11,9 @@ from typing import Any, Final
 import numpy as np
 
 from sloshlab.errors import InputError
+from studies.steady_state import MeanOverCycles
 from studies.tank_reference.comparison import POINTS, PointValues
 from studies.tank_reference.points import DrivenPoint
-from studies.tank_reference.steady_state import MeanOverCycles
 
 PLACE: Final = Path(__file__).parents[1] / "two_phase_verification" / "shaken.json"
 """Where its study keeps what it computed, if it does."""

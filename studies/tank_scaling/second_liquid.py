@@ -25,7 +25,7 @@ from acquisition.two_phase_tank.simulation import TwoPhaseTank
 from pipelines.report.style import DISTINCT_COLOURS, drawing_style, new_figure, png_bytes
 from sloshlab.atomic_file import write_bytes
 from sloshlab.constants import GRAVITY_M_PER_S2
-from studies.tank_reference.steady_state import MeanOverCycles, mean_over_cycles
+from studies.steady_state import MeanOverCycles, mean_over_cycles
 from studies.tank_scaling.harmonic_runs import RISE_CYCLES, WAITING_CYCLES, Point, cycles_of
 from studies.tank_scaling.similarity import FILL_LEVEL, TRAINING_TANK, SimilarTank
 

@@ -17,10 +17,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from studies.steady_state import MeanOverCycles
 from studies.tank_reference.comparison import SPREAD_OF_W_BAR, Liquid, PointValues, laboratory_w_bar
 from studies.tank_reference.diagnosis import CHANCE, CHOOSING, JUDGING, Misfit, Verdict, misfit, verdict
 from studies.tank_reference.points import DrivenPoint
-from studies.tank_reference.steady_state import MeanOverCycles
 from studies.two_phase_verification.effects import (
     FOLLOWED_LONGER,
     KEPT,

@@ -23,7 +23,7 @@ from acquisition.numerical_tank.tank import STANDARD_GRAVITY_M_PER_S2, Box
 from acquisition.two_phase_tank.setup import Fluids, Walls, filled_two_phase_tank
 from acquisition.two_phase_tank.simulation import TwoPhaseTank
 from sloshlab.atomic_file import write_bytes
-from studies.tank_reference.steady_state import MeanOverCycles, mean_over_cycles
+from studies.steady_state import MeanOverCycles, mean_over_cycles
 
 TANK: Final = Box(0.1172, 0.0272, 0.078)
 RISE_CYCLES: Final = 3

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sloshlab.errors import InputError
+from studies.steady_state import MeanOverCycles, mean_over_cycles, standard_error_of_correlated
 from studies.tank_reference import interfoam_run
 from studies.tank_reference.__main__ import main
 from studies.tank_reference.comparison import (
@@ -27,7 +28,6 @@ from studies.tank_reference.particle_runs import ParticleCase, read_particles
 from studies.tank_reference.planned_cases import CHANGES, planned_cases
 from studies.tank_reference.points import BEAM_POINT, COMMON_POINTS, DrivenPoint
 from studies.tank_reference.second_liquid import second_liquid
-from studies.tank_reference.steady_state import MeanOverCycles, mean_over_cycles, standard_error_of_correlated
 
 POINT = DrivenPoint(2.0, 10.0)
 CASE = InterfoamCase(POINT, 12, n_cycles=24)
