@@ -146,6 +146,8 @@ def virtual(
     """A run of the virtual laboratory, or repeats and levels of one."""
     from pipelines.recording.virtual import CAMPAIGN, FLIGHT, VirtualRun, laboratory_seed_of
 
+    if contact_angles and experiment in (CAMPAIGN, FLIGHT):
+        raise InputError("--contact-angles", got=f"with {experiment}", allowed="a single run, or its repeats")
     if experiment == FLIGHT:
         finish(_flown(model, output, seed=seed, hide=hide, n_cases=cases, truths=truths), as_json)
         return

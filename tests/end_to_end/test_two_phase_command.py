@@ -56,6 +56,12 @@ def test_contact_angles_that_cannot_be_are_refused(
     refusal(capsys, [*command, "-o", str(output)], output, told)
 
 
+@pytest.mark.parametrize("experiment", ["campaign", "flight"])
+def test_contact_angles_of_many_runs_are_refused(tmp_path: Path, capsys: Any, experiment: str) -> None:
+    command = ["virtual", experiment, "--liquid", "two_phase", "--contact-angles", "80,50"]
+    refusal(capsys, [*command, "-o", str(tmp_path / "made")], tmp_path / "made", "a single run")
+
+
 def test_contact_angles_reach_the_computed_liquid(tmp_path: Path) -> None:
     (tmp_path / "rig.toml").write_text(RIG_TEXTS[SDOF_RIG], encoding="utf-8")
     command = ["virtual", "sdof_free", "--rig", str(tmp_path / "rig.toml"), "--liquid", "two_phase"]
