@@ -82,6 +82,12 @@ def train(
     epochs: Annotated[int, typer.Option(min=1, help="At most so many.")] = 60,
     starts: Starts = 1,
     seed: StartSeed = 0,
+    galilean: Annotated[
+        bool, typer.Option("--galilean", help="A constant velocity of the tank does not change the force.")
+    ] = False,
+    weigh_small_motion: Annotated[
+        bool, typer.Option("--weigh-small-motion", help="Errors count up to 8 times where the motion is small.")
+    ] = False,
     memory_s: Annotated[
         float | None,
         typer.Option(help="Time constant of a slow state that the network sees, too.", show_default=False),
@@ -103,9 +109,18 @@ def train(
     from sloshlab.reduced_order_model.training import TrainingSettings
 
     wanted = ModelSettings(
-        model, delays, output_delays, neurons, network, rate_hz, memory_s, tuple(sudden_start or ()), ensemble
+        model,
+        delays,
+        output_delays,
+        neurons,
+        network,
+        rate_hz,
+        memory_s,
+        tuple(sudden_start or ()),
+        ensemble,
+        weigh_small_motion,
     )
-    settings = TrainingSettings(n_epochs=epochs, n_starts=starts, seed=seed)
+    settings = TrainingSettings(n_epochs=epochs, n_starts=starts, seed=seed, galilean=galilean)
     if len(rig) > 1:
         filled = files_of_fills(runs, still or [], rig)
         if test:

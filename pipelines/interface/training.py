@@ -213,6 +213,8 @@ def train(
     epochs: int = 60,
     starts: int = 1,
     seed: int = 0,
+    galilean: bool = False,
+    weigh_small_motion: bool = False,
     memory_s: float | None = None,
     sudden_start: RunsLike | None = None,
     ensemble: int = 0,
@@ -238,6 +240,10 @@ def train(
         Rate of the model [Hz]; by default chosen from the runs.
     epochs, starts, seed : int
         At most so many epochs, from so many starts; the same seed gives the same model.
+    galilean : bool
+        Whether the network sees past velocities without their mean, so that a constant one changes nothing.
+    weigh_small_motion : bool
+        Whether errors count by the inverse square of the local amplitude, up to eight times.
     memory_s : float, optional
         Time constant of a slow state of the liquid [s].
     ensemble : int
@@ -263,9 +269,19 @@ def train(
     files = RunFiles.of(run_sources(runs), more["still"], rig_source(rig))
     require_new_runs(more["test"], files)
     wanted = ModelSettings(
-        model, delays, output_delays, neurons, network, rate_hz, memory_s, more["sudden_start"], ensemble
+        model,
+        delays,
+        output_delays,
+        neurons,
+        network,
+        rate_hz,
+        memory_s,
+        more["sudden_start"],
+        ensemble,
+        weigh_small_motion,
     )
-    trained = trained_model(files, wanted, TrainingSettings(n_epochs=epochs, n_starts=starts, seed=seed))
+    settings = TrainingSettings(n_epochs=epochs, n_starts=starts, seed=seed, galilean=galilean)
+    trained = trained_model(files, wanted, settings)
     used = (*files.training, *files.validation)
     call = call_text("train", used, rig=files.rig, model=model, delays=delays, neurons=neurons, seed=seed)
     hashes = hashes_of((*used, *more["test"], *files.still, files.rig, *more["sudden_start"]))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from pipelines.inputs.recordings import RunSource
+from pipelines.liquid_model.model_settings import ModelSettings
 from pipelines.liquid_model.training_runs import TrainingRuns, require_new_runs, signals_of, sloshing_run
 from pipelines.report.progress import amounts
 from sloshlab.reduced_order_model.break_up_fit import with_break_up
@@ -44,14 +45,15 @@ def remembering(model: ReducedOrderModel, starts: Sequence[RunSource], runs: Tra
 
 
 def trained_ensemble(
-    model: ReducedOrderModel, n_members: int, runs: TrainingRuns, settings: TrainingSettings
+    model: ReducedOrderModel, wanted: ModelSettings, runs: TrainingRuns, settings: TrainingSettings
 ) -> Ensemble:
     """Train an ensemble of the structure of a model.
 
     Parameters
     ----------
     model : ReducedOrderModel
-    n_members : int
+    wanted : ModelSettings
+        How many members, and how errors count.
     runs : TrainingRuns
     settings : TrainingSettings
         Of every member.
@@ -63,17 +65,17 @@ def trained_ensemble(
         def show_epoch(member: int, epoch: Epoch) -> None:
             per_member = settings.n_starts * (settings.n_epochs + 1)
             done = member * per_member + epoch.start * (settings.n_epochs + 1) + epoch.number + 1
-            advance(done, n_members * per_member)
+            advance(done, wanted.n_members * per_member)
 
         ensemble, _ = fit_ensemble(
             model.network.kind,
             network,
             Delays(model.delays.inputs, model.delays.outputs),
-            [signals.run() for signals in runs.training],
-            [signals.run() for signals in runs.validation],
+            wanted.runs(runs.training),
+            wanted.runs(runs.validation),
             sampling_rate_hz=runs.rate_hz,
             settings=settings,
-            n_members=n_members,
+            n_members=wanted.n_members,
             agitation=model.agitation,
             on_epoch=show_epoch,
         )

@@ -251,6 +251,7 @@ def _require_plain(wanted: ModelSettings) -> None:
         ("--memory-s", wanted.memory_s is not None),
         ("--sudden-start", bool(wanted.sudden_starts)),
         ("--ensemble", wanted.n_members > 0),
+        ("--weigh-small-motion", wanted.weighs_small_motion),
     )
     for option, is_asked in asked:
         if is_asked:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from pipelines.inputs.recordings import RunSource
 from sloshlab.errors import InputError
 from sloshlab.reduced_order_model.agitation import Agitation
+from sloshlab.reduced_order_model.amplitude_weights import weighted_runs
+from sloshlab.reduced_order_model.liquid_signals import LiquidSignals
 from sloshlab.reduced_order_model.network_list import NETWORKS
-from sloshlab.reduced_order_model.regressors import Delays
+from sloshlab.reduced_order_model.regressors import Delays, Run
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,8 @@ class ModelSettings:
         Recordings from rest, to which a break-up of the liquid is fitted.
     n_members : int
         Of an ensemble trained besides; 0 for none.
+    weighs_small_motion : bool
+        Whether errors count by the inverse square of the local amplitude (`amplitude_weights`).
     """
 
     structure: str
@@ -44,6 +49,7 @@ class ModelSettings:
     memory_s: float | None = None
     sudden_starts: tuple[RunSource, ...] = ()
     n_members: int = 0
+    weighs_small_motion: bool = False
 
     def checked(self) -> ModelSettings:
         """Return self if nothing is impossible.
@@ -61,6 +67,9 @@ class ModelSettings:
             raise InputError("--network with feedback", got="multilayer", allowed="normalised_rbf, rbf")
         if self.structure == "noe" and (self.memory_s is not None or self.sudden_starts):
             raise InputError("memory of the liquid", got="--model noe", allowed="--model nfir")
+        # past forces are fed back, which weighted runs have where they count only
+        if self.structure == "noe" and self.weighs_small_motion:
+            raise InputError("--weigh-small-motion", got="--model noe", allowed="--model nfir")
         if self.n_members == 1:
             raise InputError("--ensemble", got="1", allowed="0, or at least 2")
         self.delay_lines(), self.agitation()
@@ -69,6 +78,22 @@ class ModelSettings:
     def agitation(self) -> Agitation | None:
         """Return the slow state, if there shall be one."""
         return None if self.memory_s is None else Agitation("speed", (self.memory_s,))
+
+    def runs(self, signals: Sequence[LiquidSignals]) -> list[Run]:
+        """Return runs that a training takes, in which small motion counts more where that is wanted.
+
+        Parameters
+        ----------
+        signals : sequence of LiquidSignals
+
+        Raises
+        ------
+        AnalysisError
+            See `amplitude_weights`.
+        """
+        if self.weighs_small_motion:
+            return [run for each in signals for run in weighted_runs(each)]
+        return [each.run() for each in signals]
 
     def delay_lines(self) -> Delays:
         """Return the delays of the model."""

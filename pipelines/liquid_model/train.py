@@ -19,6 +19,7 @@ from pipelines.report.progress import amounts
 from pipelines.report.result_folder import require_result_folder, withdraw_result
 from sloshlab import atomic_file
 from sloshlab.errors import InputError
+from sloshlab.reduced_order_model.amplitude_weights import LARGEST_WEIGHT, WEIGHT_ONE_G
 from sloshlab.reduced_order_model.ensemble import Ensemble
 from sloshlab.reduced_order_model.ensemble_storage import load_ensemble, save_ensemble
 from sloshlab.reduced_order_model.fit_quality import FitQuality, fit_quality
@@ -94,8 +95,8 @@ def trained_model(files: RunFiles, wanted: ModelSettings, settings: TrainingSett
             wanted.network,
             wanted.network_settings(),
             wanted.delay_lines(),
-            [signals.run() for signals in runs.training],
-            [signals.run() for signals in runs.validation],
+            wanted.runs(runs.training),
+            wanted.runs(runs.validation),
             sampling_rate_hz=runs.rate_hz,
             settings=settings,
             agitation=wanted.agitation(),
@@ -103,7 +104,7 @@ def trained_model(files: RunFiles, wanted: ModelSettings, settings: TrainingSett
         )
     errors = {"training_mse_n2": record.best.training_mse, "validation_mse_n2": record.best.validation_mse}
     model.facts.update(runs.facts() | errors)
-    ensemble = trained_ensemble(model, wanted.n_members, runs, settings) if wanted.n_members else None
+    ensemble = trained_ensemble(model, wanted, runs, settings) if wanted.n_members else None
     if wanted.sudden_starts:
         model = remembering(model, wanted.sudden_starts, runs)
     return TrainedModel(model, record, runs, wanted, settings, _quality(model, runs.validation), ensemble)
@@ -272,6 +273,13 @@ def write_training(
 def _extension_lines(trained: TrainedModel, output: Path) -> list[str]:
     """What there is beyond the model without memory."""
     lines = []
+    if trained.settings.galilean:
+        lines.append("past velocities without their mean: a constant one changes nothing")
+    if trained.wanted.weighs_small_motion:
+        lines.append(
+            f"errors of training and validation counted up to {LARGEST_WEIGHT} times where the motion is below "
+            f"{WEIGHT_ONE_G:g} g"
+        )
     if (break_up := trained.model.break_up) is not None:
         lines.append(
             f"break-up: growth {break_up.growth_per_s:.3g}/s, exponent {break_up.exponent:.2g}, "

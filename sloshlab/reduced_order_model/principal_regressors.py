@@ -36,7 +36,7 @@ class NetworkOfDistances(Protocol):
         ...
 
 
-def principal_directions(runs: Sequence[Run], delays: Delays) -> FloatArray:
+def principal_directions(runs: Sequence[Run], delays: Delays, *, galilean: bool = False) -> FloatArray:
     """Orthonormal directions of the largest mean squares, of which all others hold less than `NEGLECTED`.
 
     Parameters
@@ -44,18 +44,33 @@ def principal_directions(runs: Sequence[Run], delays: Delays) -> FloatArray:
     runs : sequence of Run
         Scaled to mean zero.
     delays : Delays
+    galilean : bool
+        Whether all directions shall be across the one of equal past inputs, so that no constant that is added to
+        the input shows along them.
 
     Returns
     -------
     ndarray, shape (n_regressors, n_directions)
-        Eigenvectors of Σ φ φᵀ, the largest first (Karhunen–Loève).
+        Eigenvectors of Σ φ φᵀ, the largest first (Karhunen–Loève); with `galilean` of Σ Pφ φᵀP, where P takes the
+        mean from the past inputs.
     """
     moments: Any = np.zeros((delays.n_regressors, delays.n_regressors))
     for phi, _ in blocks(runs, delays, _BLOCK):
         moments += phi @ phi.T
+    if galilean:
+        moments = _without_mean(_without_mean(moments, delays).T, delays)
     values, vectors = np.linalg.eigh(moments)
     across = np.cumsum(np.maximum(values, 0.0)) < NEGLECTED * values.sum()
-    return np.ascontiguousarray(vectors[:, ~across][:, ::-1])
+    kept = vectors[:, ~across][:, ::-1]
+    # once more: eigenvectors are across each other to rounding over the distance of their values only
+    return np.ascontiguousarray(_without_mean(kept, delays) if galilean else kept)
+
+
+def _without_mean(columns: FloatArray, delays: Delays) -> FloatArray:
+    """Columns of regressors without the mean of their past inputs; states stay as they are."""
+    found, n = columns.copy(), len(delays.inputs)
+    found[:n] -= columns[:n].mean(axis=0)
+    return found
 
 
 def along(basis: FloatArray, run: Run, delays: Delays) -> Run:

@@ -21,6 +21,7 @@ from sloshlab.reduced_order_model.least_squares import LeastSquaresProblem, OneS
 from sloshlab.reduced_order_model.model import ReducedOrderModel, Scaling, feedback_model, scaled_run
 from sloshlab.reduced_order_model.network_list import network_of
 from sloshlab.reduced_order_model.networks.network import Network, NormalSums
+from sloshlab.reduced_order_model.networks.radial_basis import NormalisedRadialBasis
 from sloshlab.reduced_order_model.principal_regressors import NetworkOfDistances, along, principal_directions
 from sloshlab.reduced_order_model.regressors import Delays, Run, blocks, n_samples, segments
 
@@ -56,6 +57,10 @@ class TrainingSettings:
         it says how many neurons a sample feels.
     fill_spread : float
         Standard deviation of the fill level over the training runs in the network's values, where it is an input.
+    galilean : bool
+        Whether the network shall see its past inputs without their mean. The force of a liquid does not depend on
+        a constant velocity (Galileo), but runs of a shaker, whose velocity has no mean, do not tell that. Only for
+        a normalised radial basis network without feedback.
     """
 
     n_epochs: int = 100
@@ -65,6 +70,7 @@ class TrainingSettings:
     seed: int = 0
     input_spread: float = 2.0
     fill_spread: float = 1.0
+    galilean: bool = False
 
 
 @dataclass(frozen=True)
@@ -137,6 +143,7 @@ class _Task:
     validation: list[Run]
     output_scale: float
     backend: ArrayBackend
+    galilean: bool = False
 
 
 def fit(
@@ -183,7 +190,8 @@ def fit(
     Raises
     ------
     InputError
-        If there is nothing to train on or nothing to validate with.
+        If there is nothing to train on or nothing to validate with, or the model cannot do without the mean of its
+        inputs.
     AnalysisError
         If input or output is constant, or no start gave a stable model.
     """
@@ -198,6 +206,8 @@ def fit(
         fill = FillInput.fitted([run.fill_level for run in training], chosen.fill_spread)
         delays = replace(delays, n_states=delays.n_states + 1)
     network = network_of(kind, {**settings_of_network, "n_inputs": delays.n_regressors})
+    if chosen.galilean:
+        require_galilean(network, delays, agitation)
     task = _Task(
         network,
         delays,
@@ -205,6 +215,7 @@ def fit(
         [scaled_run(run, scaling, agitation, sampling_rate_hz, fill) for run in validation],
         scaling.output_scale,
         backend or array_backend(),
+        chosen.galilean,
     )
     task, basis = _with_fewer_regressors(task)
     best, started, interrupted = _Best(), time.monotonic(), False
@@ -224,15 +235,45 @@ def fit(
     return model, TrainingRecord(best.epochs, best.epoch, ended, interrupted)
 
 
+def require_galilean(network: Network, delays: Delays, agitation: Agitation | None = None) -> None:
+    """Refuse models that cannot be blind for the mean of their past inputs.
+
+    Parameters
+    ----------
+    network : Network
+    delays : Delays
+    agitation : Agitation, optional
+
+    Raises
+    ------
+    InputError
+        If the network is none of normalised radial basis functions, has feedback, or sees a single past input or a
+        state of the speed.
+
+    Notes
+    -----
+    Where all centres are across the direction 1 of equal inputs, ‖φ + a1 − c_i‖² = ‖φ − c_i‖² + the same for all
+    i, which cancels in the shares of a normalised network (B.7), and in those alone.
+    """
+    is_plain = isinstance(network, NormalisedRadialBasis) and not delays.outputs and agitation is None
+    if not is_plain or len(delays.inputs) < 2:
+        memory = "" if agitation is None else " and slow states"
+        raise InputError(
+            "model without the mean of its inputs",
+            got=f"{network.kind} with {len(delays.inputs)} + {len(delays.outputs)} delays{memory}",
+            allowed="normalised_rbf, two delays or more, no feedback, no slow states",
+        )
+
+
 def _with_fewer_regressors(task: _Task) -> tuple[_Task, FloatArray | None]:
     """The task along the directions in which its regressors vary, where these are few; their basis."""
     # a model that runs free feeds its outputs back one by one, which has no other directions
     if task.delays.outputs or not isinstance(task.network, NetworkOfDistances):
         return task, None
-    basis = principal_directions(task.training, task.delays)
+    basis = principal_directions(task.training, task.delays, galilean=task.galilean)
     n_directions = basis.shape[1]
     # beyond half of them the sums of a delay line by correlations cost less
-    if 2 * n_directions > task.delays.n_regressors:
+    if 2 * n_directions > task.delays.n_regressors and not task.galilean:
         return task, None
     training, validation = (
         [along(basis, run, task.delays) for run in runs] for runs in (task.training, task.validation)

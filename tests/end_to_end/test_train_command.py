@@ -68,6 +68,34 @@ def changed(source: Path, target: Path, change: Any) -> Path:
     return edited(source, target, edit)
 
 
+def test_a_constant_velocity_does_not_change_the_force_of_a_galilean_model(folder, tmp_path, capsys) -> None:
+    output, velocity = tmp_path / "ROM.nc", 0.3 * np.sin(np.arange(400) / 2.0)
+    more = (*SMALL, "--no-report", "--galilean", "--json")
+    assert run([*command(folder, output, "train", "valid", more=more), *still(folder)]) in (0, DONE_BUT_FLAGGED)
+    assert "a constant one changes nothing" in capsys.readouterr().out
+    model = load_model(output)
+    np.testing.assert_allclose(model.simulate(velocity + 2.0), model.simulate(velocity), atol=1e-8)
+    refused = command(folder, tmp_path / "no.nc", "train", "valid", more=(*more, "--network", "rbf"))
+    refusal(capsys, refused, tmp_path / "no.nc", "model without the mean of its inputs: got rbf")
+
+
+def test_small_motion_that_counts_more_is_told_and_errs_by_less(folder, tmp_path, capsys) -> None:
+    fits = []
+    for more in ((), ("--weigh-small-motion", "--ensemble", "2")):
+        output = tmp_path / f"ROM_{len(more)}.nc"
+        words = command(folder, output, "train", "valid", more=(*SMALL, "--no-report", "--json", *more))
+        assert run([*words, *still(folder)]) in (0, DONE_BUT_FLAGGED)
+        said = capsys.readouterr().out
+        assert ("counted up to 8 times where the motion is below 2 g" in said) == bool(more)
+        fits.append(load_model(output).facts["validation_mse_n2"])
+    # the validation error is of the small motion, where the force is small, too
+    assert fits[1] < fits[0]
+    refused = command(
+        folder, tmp_path / "no.nc", "train", "valid", more=("--weigh-small-motion", "--model", "noe")
+    )
+    refusal(capsys, refused, tmp_path / "no.nc", "--weigh-small-motion: got --model noe")
+
+
 def test_the_report_has_everything_and_says_what_the_model_does(folder, tmp_path, capsys) -> None:
     sweeps = ("weak", "repeat_1", "repeat_2", "strong")
     tests = [part for name in sweeps for part in ("--test", str(folder / f"{name}.nc"))]
