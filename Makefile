@@ -41,7 +41,7 @@ DOCS_BRANCH ?= gh-pages
 export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks aircraft wing rom-study closed-loop replay campaign tank-campaign tank-scaling pictures tank-diagnosis trial flight-trial rivals test test-times test-newest test-all lint format type bench bench-history bench-table fuzz soak wheel docs docs-publish clean tank-reference ball-network fill-level
+.PHONY: help setup lock demo demo-cases shaker beam sdof bouncing-ball rom flutter-checks aircraft wing rom-study closed-loop replay campaign tank-campaign tank-scaling pictures tank-diagnosis trial flight-trial rivals test test-times test-newest test-all lint format type bench bench-history bench-table fuzz soak wheel docs docs-publish clean tank-reference ball-network fill-level small-motion
 
 help:  ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## */\t/' | expand -t 12
@@ -137,6 +137,9 @@ tank-scaling: setup  ## the scaling law tested: the numerical tank at seven size
 
 fill-level: setup  ## the fill level as an input of the network: five fills, each left out (20 min; goes on where it was stopped)
 	$(BIN)/python -m studies.fill_level $(RESULTS)/fill_level
+
+small-motion: setup  ## why networks err in small motion: amplitude, zero crossings or the liquid (an hour; goes on where it was stopped)
+	$(BIN)/python -m studies.small_motion $(RESULTS)/small_motion
 
 pictures: setup  ## the snapshots and the film of the numerical tank in docs/images again (minutes)
 	$(BIN)/python -m studies.numerical_tank_figures --rig raw_data/shaker/rig_fill_0.50.toml
