@@ -519,6 +519,11 @@ def steps_per_sample(
         Of the highest mode.
     speed_m_per_s : float, optional
         The largest of the place where forces act, for memories that forget with the way.
+
+    Raises
+    ------
+    AnalysisError
+        If a memory forgets faster than steps can follow.
     """
     least = steps_of_memory(twin.terms, sampling_rate_hz, speed_m_per_s)
     if twin.structure is None:
@@ -539,9 +544,22 @@ def steps_of_memory(terms: Sequence[Term], sampling_rate_hz: float, speed_m_per_
     sampling_rate_hz : float
     speed_m_per_s : float
         The largest of their place.
+
+    Raises
+    ------
+    AnalysisError
+        If `MOST_STEPS_OF_MEMORY` would be too few: in steps that long a loop overshoots the force at which it
+        yields, turns in every step, and is no loop any more.
     """
-    most = min(steps_needed(terms, sampling_rate_hz, speed_m_per_s), MOST_STEPS_OF_MEMORY)
-    return int(2 ** math.ceil(math.log2(most)))
+    needed = steps_needed(terms, sampling_rate_hz, speed_m_per_s)
+    if needed > MOST_STEPS_OF_MEMORY:
+        raise AnalysisError(
+            "a force with memory",
+            got=f"{needed:.0f} steps between two samples until it yields",
+            allowed=f"at most {MOST_STEPS_OF_MEMORY}",
+            remedy="describe it as dry friction, or sample faster",
+        )
+    return int(2 ** math.ceil(math.log2(needed)))
 
 
 def steps_needed(terms: Sequence[Term], sampling_rate_hz: float, speed_m_per_s: float) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from recorded_oscillators import DAMPING, NOISE, OMEGA, RATE_HZ, decays, driven, motion, rig, run_of
 
+from sloshlab.errors import AnalysisError
 from sloshlab.identification import rig_model
 from sloshlab.identification.diagnosed_model import Request
 from sloshlab.identification.rig_model import RigModel
@@ -217,7 +218,9 @@ def test_steps_follow_how_fast_a_loop_yields() -> None:
     assert squared.memory_rate(0.2) == pytest.approx(4000.0)
     assert rig_model.steps_of_memory([linear], 100.0, 0.2) == 16
     assert rig_model.steps_of_memory([linear, squared], 100.0, 0.2) == 32
-    assert rig_model.steps_of_memory([linear], 1.0, 0.2) == rig_model.MOST_STEPS_OF_MEMORY
+    # a thousand steps
+    with pytest.raises(AnalysisError, match="1000 steps between two samples"):
+        rig_model.steps_of_memory([linear], 1.0, 0.2)
     assert rig_model.steps_of_memory([linear], 1e4, 0.2) == rig_model.steps_of_memory([], 100.0, 0.2) == 1
     # neither a spring nor a loop that opens forever yields
     assert HYSTERESIS(stiffness_n_per_m=0.0, beta_gamma=1.0, beta_delta=0.0).memory_rate(1.0) == 0.0
