@@ -177,38 +177,38 @@ class ModelSelection:
         simpler of two forms may have been hopeless beside the other one on its way.
         """
         models = filter(self.known.may_win, self.known.leading(n))
-        nested = [
-            (model, effect)
-            for model in models
-            for effect in model.candidates
-            if self._simplified_at.get((keys_of(model.candidates), effect.key)) is not model.values
-        ]
+        nested: list[FreeRunFit] = []
+        for model in models:
+            for effect in model.candidates:
+                place = keys_of(model.candidates), effect.key
+                if self._simplified_at.get(place) is not model.values:
+                    self._simplified_at[place] = model.values
+                    nested += [without(model, effect), *self._simpler_forms(model, effect)]
         runs = self.known.runs
 
-        def fitted_without(place: tuple[FreeRunFit, Candidate]) -> FreeRunFit:
-            rest = without(*place)
-            problem = runs.problem_of(rest)
-            start = {name: value for name, value in rest.values.items() if name in problem.names}
+        def to_its_optimum(begun: FreeRunFit) -> FreeRunFit:
+            problem = runs.problem_of(begun)
+            start = {name: value for name, value in begun.values.items() if name in problem.names}
             return replace(at_its_optimum(problem, start), candidates=())
 
-        fits = list(runs.effort.spent_on(runs.model.executor, fitted_without, nested))
-        for (model, effect), fit in zip(nested, fits, strict=True):
-            self._simplified_at[keys_of(model.candidates), effect.key] = model.values
-            rest = without(model, effect)
-            self.known.keep([replace(fit, candidates=rest.candidates)])
-            self._simpler_form(model, effect, rest)
+        fits = runs.effort.spent_on(runs.model.executor, to_its_optimum, nested)
+        self.known.keep(replace(fit, candidates=begun.candidates) for begun, fit in zip(nested, fits, strict=True))
 
-    def _simpler_form(self, model: FreeRunFit, effect: Candidate, rest: FreeRunFit) -> None:
-        """What an effect of a model reduces to, in its place beside the rest."""
-        others = keys_of(rest.candidates)
-        simpler = [
-            each
-            for each in self.growth.pool
-            if effect.reduces_to(each) and self.known.of_model(others | {each.key}) is None
-        ]
-        if simpler:
-            starts = {each.key: [reduced(model, effect, each)] for each in simpler}
-            self.growth.grown([rest], f"in the place of {effect.key}", simpler, starts)
+    def _simpler_forms(self, model: FreeRunFit, effect: Candidate) -> list[FreeRunFit]:
+        """A model with what an effect reduces to in its place, from its numbers.
+
+        Again where the known fit is far behind: friction has local minima, and the wider form tells where that one
+        should have ended.
+        """
+        rest = without(model, effect)
+        begun = []
+        for simpler in self.growth.pool:
+            if effect.reduces_to(simpler):
+                known = self.known.of_model(keys_of((*rest.candidates, simpler)))
+                if known is None or not self.known.may_win(known):
+                    values = {**rest.values, **reduced(model, effect, simpler)}
+                    begun.append(FreeRunFit((*rest.candidates, simpler), values, 0.0, 0.0))
+        return begun
 
     def _refined(self, best: FreeRunFit) -> None:
         """Each effect of the best model from places about its numbers, beside its baseline and the believed one.

@@ -9,6 +9,7 @@ from typing import Any, cast
 import pytest
 from recorded_oscillators import decays, effect, rig, surroundings
 
+from sloshlab.diagnosis.selection.model_selection import ModelSelection
 from sloshlab.diagnosis.selection.nested_models import reduced
 from sloshlab.diagnosis.selection.successive_halving import _best_starts
 from sloshlab.identification.free_run_problem import FreeRunFit
@@ -68,3 +69,24 @@ def test_a_simpler_form_is_fitted_from_the_numbers_of_the_wider_one(tmp_path: Pa
     fit = FreeRunFit((wider,), {"frequency of mode 1": 1.01, **own}, 0.0, 0.0)
     assert wider.reduces_to(simpler)
     assert reduced(fit, wider, simpler) == {"structure.coulomb_friction.force_n": 5.5}
+
+
+@pytest.mark.parametrize(("known_cost", "n_begun"), [(None, 1), (5e4, 1), (110.0, 0)])
+def test_a_simpler_form_far_behind_begins_again_where_the_wider_one_ended(
+    tmp_path: Path, known_cost: float | None, n_begun: int
+) -> None:
+    """Friction that came to rest half a cycle early fits badly; the wider form that did not tells where to begin."""
+    at = surroundings(RigModel(rig(tmp_path), tmp_path, decays()))
+    wider, simpler = (
+        Candidate(effect(f"structure.{name}"), at) for name in ("asymmetric_friction", "coulomb_friction")
+    )
+    own = {"structure.asymmetric_friction.force_up_n": 5.0, "structure.asymmetric_friction.force_down_n": 6.0}
+    found = FreeRunFit((wider,), {"frequency of mode 1": 1.01, **own}, 100.0, 100.0)
+    stuck = FreeRunFit((simpler,), {"structure.coulomb_friction.force_n": 9.0}, known_cost or 0.0, 0.0)
+    runs = SimpleNamespace(model=None, tests=(), effort=None)
+    selection = ModelSelection(cast(Any, runs), at, lambda what, done, of: None)
+    selection.known.keep([found] if known_cost is None else [found, stuck])
+    begun = selection._simpler_forms(found, wider)
+    assert [each.values for each in begun] == [
+        {"frequency of mode 1": 1.01, "structure.coulomb_friction.force_n": 5.5}
+    ] * n_begun
