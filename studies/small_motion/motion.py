@@ -9,14 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
+from numpy.typing import NDArray
 
 from sloshlab.constants import GRAVITY_M_PER_S2
+from studies.splined_motion import KNOTS_PER_S, SplinedMotion, phase_at_knots, swing
 
 FloatArray = NDArray[np.float64]
 
@@ -38,52 +37,24 @@ SETTLING_S: Final = 1.5
 CARRIER_HZ: Final = 0.5
 CARRIER_RATIO: Final = 2.0
 """Amplitude of the slow velocity over that of the fast one."""
-_KNOTS_PER_S: Final = 2000
 _RISE_S: Final = 0.5
 
 
 @dataclass(frozen=True)
-class Motion:
+class Motion(SplinedMotion):
     """A motion of the tank from rest.
 
     Attributes
     ----------
-    name : str
-        One that no other has.
-    duration_s : float
     law : callable
         Takes times [s], returns velocities [m/s] without the start.
     """
 
-    name: str
-    duration_s: float
     law: Callable[[FloatArray], FloatArray]
 
-    @cached_property
-    def _velocity(self) -> CubicSpline:
-        # beyond the end, too: the filter of the last samples asks for it
-        times = np.arange(round((self.duration_s + 1) * _KNOTS_PER_S)) / _KNOTS_PER_S
-        return CubicSpline(times, self.law(times) * _smooth(times / _RISE_S))
-
-    def velocity_m_per_s(self, time_s: ArrayLike) -> FloatArray:
-        """Return the velocity of the tank at times, upward positive; 0 before the start.
-
-        Parameters
-        ----------
-        time_s : array_like
-        """
-        times = np.asarray(time_s, np.float64)
-        return np.where(times >= 0, self._velocity(np.maximum(times, 0.0)), 0.0)
-
-    def acceleration_m_per_s2(self, time_s: ArrayLike) -> FloatArray:
-        """Return its derivative; 0 before the start.
-
-        Parameters
-        ----------
-        time_s : array_like
-        """
-        times = np.asarray(time_s, np.float64)
-        return np.where(times >= 0, self._velocity(np.maximum(times, 0.0), 1), 0.0)
+    def at_knots(self, time_s: FloatArray) -> FloatArray:
+        """See `SplinedMotion`."""
+        return self.law(time_s) * _smooth(time_s / _RISE_S)
 
 
 def slow(name: str, duration_s: float, periods_s: tuple[float, float], level_g: tuple[float, float]) -> Motion:
@@ -100,11 +71,11 @@ def slow(name: str, duration_s: float, periods_s: tuple[float, float], level_g: 
     """
 
     def law(times: FloatArray) -> FloatArray:
-        omega = 2 * math.pi * _swing(FREQUENCY_HZ, periods_s[0], times)
+        omega = 2 * math.pi * swing(FREQUENCY_HZ, periods_s[0], times)
         # a smooth minimum: a kink of the level would be a jump of the acceleration
         limit = STROKE_M * omega**2 / GRAVITY_M_PER_S2
-        level = (_swing(level_g, periods_s[1], times) ** -8.0 + limit**-8) ** (-1 / 8)
-        return np.asarray(GRAVITY_M_PER_S2 * level / omega * np.sin(_phase(omega)))
+        level = (swing(level_g, periods_s[1], times) ** -8.0 + limit**-8) ** (-1 / 8)
+        return np.asarray(GRAVITY_M_PER_S2 * level / omega * np.sin(phase_at_knots(omega)))
 
     return Motion(name, duration_s, law)
 
@@ -136,7 +107,7 @@ def random_on_beam(name: str, duration_s: float, rms_g: float, seed: int) -> Mot
         size = gain * np.exp(-(((frequency - BEAM_HZ) / SPECTRUM_WIDTH_HZ) ** 2) / 4)
         drawn = np.random.default_rng([seed, 7]).standard_normal((number.size, 2)) @ np.array([1.0, 1.0j]) * size
         drawn *= rms_g * GRAVITY_M_PER_S2 / math.sqrt(0.5 * float(np.sum(np.abs(drawn) ** 2)))
-        n = round(period_s * _KNOTS_PER_S)
+        n = round(period_s * KNOTS_PER_S)
         lines = np.zeros(n // 2 + 1, complex)
         lines[number] = 0.5 * n * drawn / (2j * math.pi * frequency)
         return np.asarray(np.fft.irfft(lines, n)[: times.size])
@@ -157,7 +128,7 @@ def carried(name: str) -> Motion:
     """
 
     def law(times: FloatArray) -> FloatArray:
-        omega = 2 * math.pi * _swing((9.0, 13.0), STAGE_S, times)
+        omega = 2 * math.pi * swing((9.0, 13.0), STAGE_S, times)
         stage = times / STAGE_S
         edges = 2 * STAGE_S * np.arange(1, len(LEVELS_G))
         steps = np.diff(LEVELS_G)[:, None] * _smooth((times[None, :] - edges[:, None]) / _RISE_S)
@@ -166,7 +137,7 @@ def carried(name: str) -> Motion:
         # whole periods of the carrier fit a stage but for its ends, where it is faded in and out
         share = _smooth(within / _RISE_S) * _smooth((STAGE_S - within) / _RISE_S)
         slow_velocity = CARRIER_RATIO * share * np.sin(2 * math.pi * CARRIER_HZ * times)
-        return np.asarray(speed * (np.sin(_phase(omega)) + slow_velocity))
+        return np.asarray(speed * (np.sin(phase_at_knots(omega)) + slow_velocity))
 
     return Motion(name, 2 * STAGE_S * len(LEVELS_G), law)
 
@@ -185,15 +156,6 @@ def stages(sampling_rate_hz: float, n_samples: int) -> tuple[FloatArray, NDArray
     level = np.array([*LEVELS_G, np.nan])[np.minimum(number // 2, len(LEVELS_G))]
     settled = (within >= SETTLING_S) & (within < STAGE_S - _RISE_S)
     return np.where(settled, level, np.nan), number % 2 == 1
-
-
-def _phase(omega: FloatArray) -> FloatArray:
-    return np.concatenate([[0.0], np.cumsum((omega[1:] + omega[:-1]) / (2 * _KNOTS_PER_S))])
-
-
-def _swing(ends: tuple[float, float], period_s: float, time_s: FloatArray) -> FloatArray:
-    low, high = ends
-    return np.asarray(low + (high - low) * (1 - np.cos(2 * math.pi / period_s * time_s)) / 2)
 
 
 def _smooth(share: FloatArray) -> FloatArray:

@@ -75,7 +75,7 @@ def test_a_simpler_form_is_fitted_from_the_numbers_of_the_wider_one(tmp_path: Pa
 def test_a_simpler_form_far_behind_begins_again_where_the_wider_one_ended(
     tmp_path: Path, known_cost: float | None, n_begun: int
 ) -> None:
-    """Friction that came to rest half a cycle early fits badly; the wider form that did not tells where to begin."""
+    """Friction that came to rest half a cycle early fits badly; the wider form tells where to begin."""
     at = surroundings(RigModel(rig(tmp_path), tmp_path, decays()))
     wider, simpler = (
         Candidate(effect(f"structure.{name}"), at) for name in ("asymmetric_friction", "coulomb_friction")
