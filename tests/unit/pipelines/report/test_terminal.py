@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from io import StringIO
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -84,7 +85,7 @@ def test_notes_of_progress_are_shown_as_they_are(name: str, monkeypatch: pytest.
 
 def test_a_pipe_has_a_line_every_half_minute(capsys: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
-    monkeypatch.setattr("pipelines.report.progress.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("pipelines.report.progress.time", SimpleNamespace(monotonic=lambda: now[0]))
     with amounts("diagnosing") as advance:
         for second in range(0, 100, 5):
             now[0] = 100.0 + second
