@@ -555,7 +555,7 @@ def steps_of_memory(terms: Sequence[Term], sampling_rate_hz: float, speed_m_per_
     if needed > MOST_STEPS_OF_MEMORY:
         raise AnalysisError(
             "a force with memory",
-            got=f"{needed:.0f} steps between two samples until it yields",
+            got=f"a need of {needed:.0f} steps between two samples to follow how it yields",
             allowed=f"at most {MOST_STEPS_OF_MEMORY}",
             remedy="describe it as dry friction, or sample faster",
         )

@@ -65,7 +65,7 @@ def test_where_the_motion_is_not_known_samples_count_once() -> None:
 
 
 def test_a_rate_without_a_range_is_refused() -> None:
-    with pytest.raises(AnalysisError, match=r"got 8 Hz; allowed: 12.5 Hz and more|got 8 Hz"):
+    with pytest.raises(AnalysisError, match=r"8 Hz.*12\.5 Hz and more"):
         amplitude_weights(shaken([1.0], rate_hz=8.0))
 
 
