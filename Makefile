@@ -31,6 +31,8 @@ LARGE_PAGES = GLIBC_TUNABLES=glibc.malloc.hugetlb=1 PYTHONMALLOC=malloc
 ONE_THREAD = OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 # of random inputs a tenth in `make test`, all in `make test-all`
 FEWER = SLOSHLAB_FEWER_EXAMPLES=1
+# a test that waits for ever would end as a run that is stopped and names none; the slow ones take longer than this
+LONGEST_TEST = --timeout 300
 # a file by one worker, in the order of tests/measured_times.csv
 PYTEST = $(LARGE_PAGES) $(ONE_THREAD) $(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder
 BENCH ?=
@@ -173,10 +175,10 @@ rivals: setup  ## other ways to answer the cases of `make trial`, marked alike; 
 	  -o $(RESULTS)/rivals
 
 test: setup  ## the tests, about a quarter of an hour on 2 cores
-	$(FEWER) $(PYTEST) -m "not slow"
+	$(FEWER) $(PYTEST) $(LONGEST_TEST) -m "not slow"
 
 test-times: setup  ## the tests, and what each file of them costs into tests/measured_times.csv
-	$(FEWER) $(PYTEST) -m "not slow" -p tests.measured_times
+	$(FEWER) $(PYTEST) $(LONGEST_TEST) -m "not slow" -p tests.measured_times
 
 test-newest:  ## the tests with the newest dependencies, in an environment of their own
 	rm -rf .venv-newest
