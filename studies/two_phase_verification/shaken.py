@@ -17,13 +17,18 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition.numerical_tank.forced_motion import HarmonicMotion, moved
 from acquisition.numerical_tank.tank import STANDARD_GRAVITY_M_PER_S2, Box
-from acquisition.two_phase_tank.setup import Fluids, Walls, filled_two_phase_tank
+from acquisition.two_phase_box.setup import TwoPhaseBoxSetup
+from acquisition.two_phase_tank.energy import TwoPhaseAccount
+from acquisition.two_phase_tank.setup import Fluids, TwoPhaseSetup, Walls, filled_two_phase_tank
 from acquisition.two_phase_tank.simulation import TwoPhaseTank
 from sloshlab.atomic_file import write_bytes
 from studies.steady_state import MeanOverCycles, mean_over_cycles
+
+FloatArray = NDArray[np.float64]
 
 TANK: Final = Box(0.1172, 0.0272, 0.078)
 RISE_CYCLES: Final = 3
@@ -152,25 +157,92 @@ def shaken(case: Shaking) -> Shaken:
         ),
         seed=case.seed,
     )
-    tank, period, omega = TwoPhaseTank(setup), 1 / case.frequency_hz, 2 * math.pi * case.frequency_hz
-    amplitude = case.acceleration_g * STANDARD_GRAVITY_M_PER_S2
-    motion = HarmonicMotion(amplitude, case.frequency_hz, rise_s=RISE_CYCLES * period)
-    volume, started_s = tank.liquid_volume_m2(), time.process_time()
+    return measured(TwoPhaseTank(setup), case)
+
+
+def measured(tank: TwoPhaseTank, case: Shaking) -> Shaken:
+    """Shake a tank that has been set up as a case asks, and return what it gave.
+
+    Parameters
+    ----------
+    tank : TwoPhaseTank
+        At rest.
+    case : Shaking
+    """
+    setup, period = tank.setup, 1 / case.frequency_hz
+    motion = motion_of(case)
+    volume, started_s = float(tank.liquid_fraction.sum()), time.process_time()
     n_used = case.n_cycles // 2
     for _ in moved(tank, motion, (case.n_cycles - n_used) * period):
         pass
     before = tank.account()
-    unit = setup.liquid_mass_kg * (amplitude / omega) ** 2
-    works, in_phase = list[float](), list[float]()
+    cycles = list[tuple[float, float]]()
     for _ in range(n_used):
         blocks = list(moved(tank, motion, period, block_s=period))
         times = np.concatenate([block.time_s for block in blocks])
         force = np.concatenate([block.forces.vertical_n for block in blocks])
-        force += setup.fluid_mass_kg * STANDARD_GRAVITY_M_PER_S2
-        works.append(-float(np.mean(force * np.sin(omega * times))) * amplitude / omega * period / unit)
-        excess = force + setup.fluid_mass_kg * amplitude * np.cos(omega * times)
-        in_phase.append(-2 * float(np.mean(excess * np.cos(omega * times))) / (setup.liquid_mass_kg * amplitude))
-    spent = tank.account() - before
+        cycles.append(of_a_cycle(setup, case, times, force))
+    change = float(tank.liquid_fraction.sum()) / volume - 1
+    speed = (time.process_time() - started_s) / tank.time_s
+    return told(setup, case, cycles, (tank.account() - before, change, speed))
+
+
+def motion_of(case: Shaking) -> HarmonicMotion:
+    """Return the motion of the tank.
+
+    Parameters
+    ----------
+    case : Shaking
+    """
+    amplitude = case.acceleration_g * STANDARD_GRAVITY_M_PER_S2
+    return HarmonicMotion(amplitude, case.frequency_hz, rise_s=RISE_CYCLES / case.frequency_hz)
+
+
+def _unit_j(setup: TwoPhaseSetup | TwoPhaseBoxSetup, case: Shaking) -> float:
+    """m_l u₀² Ω²."""
+    amplitude = case.acceleration_g * STANDARD_GRAVITY_M_PER_S2
+    return setup.liquid_mass_kg * (amplitude / (2 * math.pi * case.frequency_hz)) ** 2
+
+
+def of_a_cycle(
+    setup: TwoPhaseSetup | TwoPhaseBoxSetup, case: Shaking, times_s: FloatArray, force_n: FloatArray
+) -> tuple[float, float]:
+    """Return W̄ and β of one cycle.
+
+    Parameters
+    ----------
+    setup : TwoPhaseSetup or TwoPhaseBoxSetup
+    case : Shaking
+    times_s, force_n : ndarray, shape (n,)
+        Middles of the steps of the cycle, and the vertical force of the fluids on the tank.
+    """
+    omega, amplitude = 2 * math.pi * case.frequency_hz, case.acceleration_g * STANDARD_GRAVITY_M_PER_S2
+    force = force_n + setup.fluid_mass_kg * STANDARD_GRAVITY_M_PER_S2
+    work_j = -float(np.mean(force * np.sin(omega * times_s))) * amplitude / omega / case.frequency_hz
+    excess = force + setup.fluid_mass_kg * amplitude * np.cos(omega * times_s)
+    beta = -2 * float(np.mean(excess * np.cos(omega * times_s))) / (setup.liquid_mass_kg * amplitude)
+    return work_j / _unit_j(setup, case), beta
+
+
+def told(
+    setup: TwoPhaseSetup | TwoPhaseBoxSetup,
+    case: Shaking,
+    cycles: Sequence[tuple[float, float]],
+    rest: tuple[TwoPhaseAccount, float, float],
+) -> Shaken:
+    """Return what a run gave.
+
+    Parameters
+    ----------
+    setup : TwoPhaseSetup or TwoPhaseBoxSetup
+    case : Shaking
+    cycles : sequence of tuple of float
+        W̄ and β of every cycle that counts.
+    rest : tuple
+        Account of these cycles, change of the liquid's volume over itself, seconds of a processor for a second.
+    """
+    works, in_phase = [cycle[0] for cycle in cycles], [cycle[1] for cycle in cycles]
+    spent, volume_change, computing_s_per_s = rest
     given = spent.tank_work_j_per_m
     w_bar, beta = mean_over_cycles(works), mean_over_cycles(in_phase)
     return Shaken(
@@ -181,11 +253,11 @@ def shaken(case: Shaking) -> Shaken:
         float(np.std(works)),
         w_bar.standard_error,
         beta.standard_error,
-        given * setup.box.depth_m / n_used / unit,
+        given * setup.box.depth_m / len(works) / _unit_j(setup, case),
         {name.removesuffix("_j_per_m"): value / given for name, value in asdict(spent).items()},
         spent.residual_j_per_m / given,
-        tank.liquid_volume_m2() / volume - 1,
-        (time.process_time() - started_s) / tank.time_s,
+        volume_change,
+        computing_s_per_s,
     )
 
 
@@ -219,7 +291,20 @@ CAMPAIGN: Final = tuple(
     for level_g in (4.0, 2.0, 1.0, 0.5, 3.0, 6.0, 1.5, 5.0)
     for frequency_hz in (8.0, 9.5, 11.0, 12.5, 14.5, 18.0)
 )
-POINTS: Final = {"map": MAP, "coarse": COARSE, "resolution": RESOLUTION, "causes": CAUSES, "campaign": CAMPAIGN}
+BESIDE_BOX: Final = tuple(
+    replace(case, seed=seed)
+    for case in (Shaking(4.0, 11.4, 24, 12), Shaking(2.04, 10.7, 24, 12), Shaking(0.5, 11.4, 48, 12))
+    for seed in (0, 1)
+)
+"""With the cells of the tank in three dimensions."""
+POINTS: Final = {
+    "map": MAP,
+    "coarse": COARSE,
+    "resolution": RESOLUTION,
+    "causes": CAUSES,
+    "campaign": CAMPAIGN,
+    "beside_box": BESIDE_BOX,
+}
 """What can be computed, by name; the causes change one thing at a time on the coarse grid."""
 
 

@@ -49,13 +49,19 @@ def test_several_cells_deep_it_computes_the_flow_of_the_plane(along_depth: bool,
     wave = np.clip(surface[:, None] - np.arange(n_up), 0, 1)
     plane.set_fractions(wave)
     box.set_fractions(np.broadcast_to(wave if along_depth else wave[:, None], box.setup.cells))
-    motion = HarmonicMotion(1.5 * 9.81, 11.4, rise_s=0.02)(plane.times_s(150))
-    one, other = plane.advance(motion), box.advance(motion)
+    upward = HarmonicMotion(1.5 * 9.81, 11.4, rise_s=0.02)(plane.times_s(60))
+    sideways = HarmonicMotion(0.2 * 9.81, 7.0)(plane.times_s(60))
+    still = np.zeros(60)
+    one = plane.advance(np.stack([sideways, upward], axis=1))
+    other = box.advance(np.stack([still, sideways, upward] if along_depth else [sideways, still, upward], axis=1))
     strongest = float(np.abs(one.vertical_n).max())
     assert float(np.abs(plane.velocities()[0]).max()) > 0.05
+    assert float(np.abs(one.horizontal_n).max()) > 0.05 * strongest
     # of six steps two take depth and height in the other order than the plane takes length and height
     exact = 1e-5 if along_depth else 1e-6
     assert other.vertical_n / n_short == pytest.approx(one.vertical_n, abs=exact * strongest)
+    along = other.sideways_n if along_depth else other.horizontal_n
+    assert along / n_short == pytest.approx(one.horizontal_n, abs=exact * strongest)
     # per metre of depth, which is the wave's way where it runs along it
     share = n_short / n_long if along_depth else 1.0
     expected = share * plane.account().viscosity_j_per_m
