@@ -113,12 +113,12 @@ def train(
         delays,
         output_delays,
         neurons,
-        network,
-        rate_hz,
-        memory_s,
-        tuple(sudden_start or ()),
-        ensemble,
-        weigh_small_motion,
+        network=network,
+        rate_hz=rate_hz,
+        memory_s=memory_s,
+        sudden_starts=tuple(sudden_start or ()),
+        n_members=ensemble,
+        weighs_small_motion=weigh_small_motion,
     )
     settings = TrainingSettings(n_epochs=epochs, n_starts=starts, seed=seed, galilean=galilean)
     if len(rig) > 1:

@@ -273,12 +273,12 @@ def train(
         delays,
         output_delays,
         neurons,
-        network,
-        rate_hz,
-        memory_s,
-        more["sudden_start"],
-        ensemble,
-        weigh_small_motion,
+        network=network,
+        rate_hz=rate_hz,
+        memory_s=memory_s,
+        sudden_starts=more["sudden_start"],
+        n_members=ensemble,
+        weighs_small_motion=weigh_small_motion,
     )
     settings = TrainingSettings(n_epochs=epochs, n_starts=starts, seed=seed, galilean=galilean)
     trained = trained_model(files, wanted, settings)

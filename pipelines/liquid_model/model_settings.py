@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 from pipelines.inputs.recordings import RunSource
@@ -44,6 +44,7 @@ class ModelSettings:
     delays: int
     output_delays: int
     neurons: int
+    _: KW_ONLY
     network: str = "normalised_rbf"
     rate_hz: float | None = None
     memory_s: float | None = None
