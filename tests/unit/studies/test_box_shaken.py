@@ -1,0 +1,52 @@
+"""The box on the shaker: a run that was stopped gives what it would have given."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from acquisition.two_phase_box import checkpoint
+from studies.two_phase_verification import box_shaken
+from studies.two_phase_verification.shaken import Shaking
+
+CASE = Shaking(3.0, 11.4, 4, 6)
+
+
+def test_a_run_that_was_stopped_goes_on_to_the_same_result(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = box_shaken.shaken_box(CASE)
+    kept, saved, save = box_shaken.beside(tmp_path / "box.json", CASE), list[int](), checkpoint.save
+
+    def stops(tank: Any, path: Path, extra: Any) -> None:
+        save(tank, path, extra)
+        saved.append(tank.n_steps)
+        if len(saved) == 3:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(checkpoint, "save", stops)
+    with pytest.raises(KeyboardInterrupt):
+        box_shaken.shaken_box(CASE, kept)
+    again = box_shaken.shaken_box(CASE, kept)
+    assert len(saved) > 3
+    assert not kept.exists()
+    assert replace(again, computing_s_per_s=0.0) == replace(whole, computing_s_per_s=0.0)
+    assert len(again.w_bar_of_cycles) == 2
+
+
+def test_every_case_has_a_file_of_its_own() -> None:
+    cases = [case for group in box_shaken.POINTS.values() for case in group]
+    assert len({box_shaken.beside(Path("box.json"), case) for case in cases}) == len(cases) == 10
+
+
+def test_kept_results_account_for_all_energy_and_liquid() -> None:
+    kept = json.loads(Path(box_shaken.__file__).with_name("box_shaken.json").read_text(encoding="utf-8"))
+    assert len(kept) >= 6
+    for name, found in kept.items():
+        assert Shaking(**found["case"]).name == name
+        assert abs(found["residual_share"]) < 1e-3
+        assert abs(found["volume_change"]) < 1e-5
+        # the same work by the force and by the account
+        assert abs(found["account_w_bar"] - found["w_bar"]) < 0.05
