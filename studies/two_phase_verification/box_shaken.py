@@ -13,7 +13,7 @@ import json
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, astuple, fields
+from dataclasses import asdict, astuple, fields, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -26,7 +26,16 @@ from acquisition.two_phase_box.simulation import TwoPhaseBox
 from acquisition.two_phase_tank.energy import TwoPhaseAccount
 from acquisition.two_phase_tank.setup import Fluids, Walls, filled_two_phase_tank
 from sloshlab.atomic_file import write_bytes
-from studies.two_phase_verification.shaken import TANK, Shaken, Shaking, motion_of, of_a_cycle, rows, told
+from studies.two_phase_verification.shaken import (
+    CAMPAIGN,
+    TANK,
+    Shaken,
+    Shaking,
+    motion_of,
+    of_a_cycle,
+    rows,
+    told,
+)
 
 POINTS: Final = {
     "first": (
@@ -44,7 +53,7 @@ POINTS: Final = {
         Shaking(2.04, 10.7, 24, 16),
         Shaking(0.5, 11.4, 48, 16),
     ),
-    "slow": (Shaking(4.0, 8.0, 24, 12),),
+    "campaign": tuple(replace(case, cells_per_height=12) for case in CAMPAIGN),
 }
 """What can be computed, by name."""
 
