@@ -88,7 +88,10 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except _UsageError as error:
         _show(error)
         return USAGE
-    except (KeyboardInterrupt, typer.Abort):
+    except (KeyboardInterrupt, typer.Abort) as end:
+        # typer takes an end of file for Ctrl-D at a question; commands ask none: it is a file that ends early
+        if isinstance(end.__cause__, EOFError):
+            raise end.__cause__ from None
         complain("sloshlab: interrupted; nothing half-written")
         return INTERRUPTED
     except interrupt.Terminated as termination:

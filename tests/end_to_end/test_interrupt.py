@@ -61,6 +61,18 @@ def test_interrupted_at_a_known_place(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_file_that_ends_early_is_no_interrupt(laboratory: Path, tmp_path: Path, monkeypatch) -> None:
+    """typer takes EOFError for Ctrl-D at a question: a damaged file within a command was told as interrupted."""
+
+    def damaged(*arguments: Any, **options: Any) -> None:
+        raise EOFError("marshal data too short")
+
+    monkeypatch.setattr(pipelines.sweep.stages, "evaluate_windows", damaged)
+    with pytest.raises(EOFError, match="too short"):
+        run(arguments_for(laboratory, tmp_path / "out"))
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("is_interrupted", [True, False])
 def test_an_interrupt_told_as_another_error_is_one(
     is_interrupted, laboratory: Path, tmp_path: Path, monkeypatch
