@@ -104,14 +104,12 @@ def mirror(values, g):  # type: ignore[no-untyped-def]
         a[:, :, nz + LAYERS + n] = a[:, :, nz + LAYERS - 1]
 
 
-@njit(cache=True, error_model="numpy")
-def mirror_velocity(v, g):  # type: ignore[no-untyped-def]
+def mirror_velocity(v: FloatArray, g: Grid) -> None:
     """As `mirror` along the walls; across them there is none, on the walls and beyond."""
-    nx, ny, nz = g.n
-    shape = (nx + 2 * LAYERS, ny + 2 * LAYERS, nz + 2 * LAYERS)
     for axis in range(3):
         mirror(v[axis], g)
-    x, y, z = v[0].reshape(shape), v[1].reshape(shape), v[2].reshape(shape)
+    nx, ny, nz = g.n
+    x, y, z = (component.reshape(g.shape) for component in v)
     x[: LAYERS + 1], x[LAYERS + nx :] = 0.0, 0.0
     y[:, : LAYERS + 1], y[:, LAYERS + ny :] = 0.0, 0.0
     z[:, :, : LAYERS + 1], z[:, :, LAYERS + nz :] = 0.0, 0.0

@@ -75,7 +75,6 @@ def _push(state, work, dt, g):  # type: ignore[no-untyped-def]
                 first, behind = place(g, i, j, 0), place(g, i, j, g.n[2])
                 for n in range(first + int(axis == 2), behind):
                     v[n] -= dt * b[n] * (p[n] - p[n - s]) / d
-    mirror_velocity(state.v, g)
 
 
 @njit(cache=True, error_model="numpy")
@@ -124,6 +123,7 @@ def _part(flow: Flow, acceleration: FloatArray, dt: float, n_carries: int) -> tu
     if n < 0:
         return NO_PRESSURE, np.zeros(3)
     _push(state, work, dt, g)
+    mirror_velocity(state.v, g)
     add_works(state, work, body, acceleration, dt, g, k_, sums)
     sums[ITERATIONS] += n
     sums[PARTS] += 1

@@ -90,18 +90,22 @@ def _curvature_of_heights(c, n, ijk, axis, sign, g, reach):  # type: ignore[no-u
 
 
 @njit(cache=True, error_model="numpy")
-def _smooth(c, out, work, g):  # type: ignore[no-untyped-def]
+def _smooth_along(source, out, axis, g):  # type: ignore[no-untyped-def]
+    s = g.s[axis]
+    for i in range(g.n[0]):
+        for j in range(g.n[1]):
+            first = place(g, i, j, 0)
+            for n in range(first, first + g.n[2]):
+                out[n] = 0.25 * (source[n - s] + 2.0 * source[n] + source[n + s])
+
+
+def _smooth(c: FloatArray, out: FloatArray, room: FloatArray, g: Grid) -> None:
     """Volume fractions averaged over 27 cells: one, two, one along each axis in turn."""
-    work.flux[:] = c
+    room[:] = c
     for axis in range(3):
-        s, source = g.s[axis], work.flux
-        for i in range(g.n[0]):
-            for j in range(g.n[1]):
-                first = place(g, i, j, 0)
-                for n in range(first, first + g.n[2]):
-                    out[n] = 0.25 * (source[n - s] + 2.0 * source[n] + source[n + s])
+        _smooth_along(room, out, axis, g)
         mirror(out, g)
-        work.flux[:] = out
+        room[:] = out
 
 
 @njit(cache=True, error_model="numpy")
@@ -199,38 +203,49 @@ def _normal_of(c, work, n, g):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def find_curvature(c, work, g, k_):  # type: ignore[no-untyped-def]
-    """κ of all cells of the interface, into an array that is unknown elsewhere; planes must have been found.
+def _curvatures_of_heights(c, work, g, reach, most):  # type: ignore[no-untyped-def]
+    kappa = work.kappa
+    for i in range(g.n[0]):
+        for j in range(g.n[1]):
+            for k in range(g.n[2]):
+                n = place(g, i, j, k)
+                kappa[n] = UNKNOWN
+                if _is_interface(c, n, g):
+                    found = _curvature_of_cell(c, n, (i, j, k), _normal_of(c, work, n, g), g, reach)
+                    if found < UNKNOWN:
+                        kappa[n] = min(max(found, -most), most)
+
+
+@njit(cache=True, error_model="numpy")
+def _other_curvatures(c, work, out, g, deep, most):  # type: ignore[no-untyped-def]
+    """Those of heights, and those of the cells that have none, into `out`."""
+    kappa = work.kappa
+    for i in range(g.n[0]):
+        for j in range(g.n[1]):
+            for k in range(g.n[2]):
+                n = place(g, i, j, k)
+                out[n] = kappa[n]
+                if kappa[n] >= UNKNOWN and _is_interface(c, n, g):
+                    if deep:
+                        out[n] = _curvature_beside(work, n, _normal_of(c, work, n, g), g)
+                    if out[n] >= UNKNOWN:
+                        out[n] = _curvature_of_normals(work.smooth, n, g, most)
+
+
+def find_curvature(c: FloatArray, work: Work, g: Grid, k_: Constants) -> None:
+    """κ of all cells of the interface, unknown elsewhere; planes and their middles must have been found.
 
     By heights; where there are none, of the neighbours that have some, as Basilisk has it; else by normals.
     """
-    smooth, kappa, others = work.smooth, work.kappa, work.source
-    most = 2.0 * k_.roundest
     # one cell deep it is the plane, which has heights and normals only
-    deep = min(g.n[0], g.n[1], g.n[2]) > 1
-    reach = _REACH if deep else _REACH_IN_PLANE
-    _smooth(c, smooth, work, g)
-    for i in range(g.n[0]):
-        for j in range(g.n[1]):
-            for k in range(g.n[2]):
-                n = place(g, i, j, k)
-                if _is_interface(c, n, g):
-                    found = _curvature_of_cell(c, n, (i, j, k), _normal_of(c, work, n, g), g, reach)
-                    kappa[n] = min(max(found, -most), most) if found < UNKNOWN else UNKNOWN
-    mirror(kappa, g)
-    # all first, for a neighbour without heights must not count
-    for i in range(g.n[0]):
-        for j in range(g.n[1]):
-            for k in range(g.n[2]):
-                n = place(g, i, j, k)
-                others[n] = kappa[n]
-                if kappa[n] >= UNKNOWN and _is_interface(c, n, g):
-                    if deep:
-                        others[n] = _curvature_beside(work, n, _normal_of(c, work, n, g), g)
-                    if others[n] >= UNKNOWN:
-                        others[n] = _curvature_of_normals(smooth, n, g, k_.roundest)
-    kappa[:] = others
-    mirror(kappa, g)
+    deep = min(g.n) > 1
+    _smooth(c, work.smooth, work.flux, g)
+    _curvatures_of_heights(c, work, g, _REACH if deep else _REACH_IN_PLANE, 2.0 * k_.roundest)
+    mirror(work.kappa, g)
+    # all heights first, for a neighbour without them must not count
+    _other_curvatures(c, work, work.source, g, deep, k_.roundest)
+    work.kappa[:] = work.source
+    mirror(work.kappa, g)
 
 
 @njit(cache=True, error_model="numpy")

@@ -104,7 +104,6 @@ def _carry_liquid(c, work, axis, g):  # type: ignore[no-untyped-def]
             for n in range(first, first + g.n[2]):
                 gain = work.centre[n] * (volume[n + s] - volume[n])
                 c[n] += gain - liquid[n + s] + liquid[n]
-    mirror(c, g)
 
 
 def _carry(state: State, work: Work, axis: int, g: Grid, k_: Constants) -> None:
@@ -117,6 +116,7 @@ def _carry(state: State, work: Work, axis: int, g: Grid, k_: Constants) -> None:
     state.v[:] = work.dv
     mirror_velocity(state.v, g)
     _carry_liquid(state.c, work, axis, g)
+    mirror(state.c, g)
 
 
 @njit(cache=True, error_model="numpy")
@@ -145,7 +145,6 @@ def _clip(c, g):  # type: ignore[no-untyped-def]
                 kept = 0.0 if f < EMPTY else (1.0 if f > 1.0 - EMPTY else f)
                 clipped += kept - f
                 c[n] = kept
-    mirror(c, g)
     return clipped
 
 
@@ -160,5 +159,6 @@ def transport(state: State, work: Work, dt: float, order: tuple[int, int, int], 
         _volumes(state, work, axis, dt, g, k_)
         _carry(state, work, axis, g, k_)
     clipped = float(_clip(state.c, g))
+    mirror(state.c, g)
     find_density(state.c, work, k_)
     return clipped
