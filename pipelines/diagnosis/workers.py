@@ -18,6 +18,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkContext, ForkProcess
+from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
 from sloshlab.errors import AnalysisError
@@ -206,10 +207,17 @@ def _most_copies() -> int:
     # A process that ends with its parent, as those of a pool, may have none of its own.
     if not FORKS or multiprocessing.current_process().daemon:
         return 0
+    return int(_MOST_BYTES / _peak_bytes())
+
+
+def _peak_bytes() -> int:
+    """The most memory that this process has needed; `ru_maxrss` begins with that of the one that started it."""
+    with suppress(OSError, ValueError, IndexError):
+        return 1024 * int(Path("/proc/self/status").read_text(encoding="utf-8").partition("VmHWM:")[2].split()[0])
     # not on every system
     import resource
 
-    return int(_MOST_BYTES / (1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss))
+    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 def _n_cores() -> int:

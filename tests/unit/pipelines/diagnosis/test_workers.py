@@ -21,6 +21,12 @@ from sloshlab.identification.effort import Effort
 from sloshlab.twin.lane_preparation import Executor, InTurn
 
 
+@pytest.fixture(autouse=True)
+def a_small_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tests before these, and loops that were compiled for them, may have needed more than copies are made of."""
+    monkeypatch.setattr(workers, "_MOST_BYTES", 1024**5)
+
+
 @pytest.mark.parametrize("n_workers", [1, 2, 5])
 def test_results_are_in_the_order_of_the_items(n_workers: int) -> None:
     assert Workers(n_workers).map(lambda n: n * n, range(20)) == [n * n for n in range(20)]
@@ -93,6 +99,16 @@ def test_long_pieces_are_done_by_processes_and_what_is_within_them_in_turn() -> 
 def test_a_large_process_is_not_copied(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(workers, "_MOST_BYTES", 1024**2)
     assert set(Workers(2).map_apart(lambda _: os.getpid(), range(4))) == {os.getpid()}
+
+
+@pytest.mark.skipif(not FORKS, reason="no copies of processes here")
+def test_a_process_that_a_large_one_has_started_is_not_large() -> None:
+    """As a notebook that holds recordings starts one: it made no copies, and took twice as long."""
+    n_bytes = 600 * 1024**2
+    assert len(bytearray(b"x") * n_bytes) == n_bytes
+    script = "from pipelines.diagnosis import workers; print(workers._peak_bytes())"
+    started = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert 10 * 1024**2 < int(started.stdout) < n_bytes
 
 
 @pytest.mark.skipif(not FORKS, reason="no copies of processes here")
