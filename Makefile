@@ -32,7 +32,7 @@ ONE_THREAD = OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 # of random inputs a tenth in `make test`, all in `make test-all`
 FEWER = SLOSHLAB_FEWER_EXAMPLES=1
 # a test that waits for ever would end as a run that is stopped and names none; the slow ones take longer than this
-LONGEST_TEST = --timeout 300
+LONGEST_TEST = --timeout 600
 # a file by one worker, in the order of tests/measured_times.csv
 PYTEST = $(LARGE_PAGES) $(ONE_THREAD) $(BIN)/python -m pytest -n $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder
 BENCH ?=
