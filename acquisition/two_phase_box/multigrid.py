@@ -12,15 +12,13 @@ from typing import Final, NamedTuple
 import numpy as np
 from numba import njit
 
-from acquisition.two_phase_box.grid import FloatArray, Grid
+from acquisition.two_phase_box.grid import LAYERS, FloatArray, Grid
 
 _COARSEST: Final = 3
 """Cells along an axis below which it is not halved."""
 _MOST_LEVELS: Final = 5
 _SMOOTHINGS: Final = 1
 _COARSE_SMOOTHINGS: Final = 12
-_PAD: Final = 2
-"""Layers of a `Grid`."""
 
 
 class Level(NamedTuple):
@@ -122,8 +120,8 @@ def _set_finest(fine, b, d):  # type: ignore[no-untyped-def]
     """Coefficients of the finest grid from the 1/ρ of the faces, of a `Grid` with its layers."""
     ax, ay, az = fine.ax, fine.ay, fine.az
     nx, ny, nz = ax.shape[0] - 2, ax.shape[1] - 2, ax.shape[2] - 2
-    deep, up = ny + 2 * _PAD, nz + 2 * _PAD
-    shift = _PAD - 1
+    deep, up = ny + 2 * LAYERS, nz + 2 * LAYERS
+    shift = LAYERS - 1
     for i in range(1, nx + 1):
         for j in range(1, ny + 1):
             for k in range(1, nz + 1):

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from acquisition.two_phase_box.grid import place
 from acquisition.two_phase_tank.reconstruction import EMPTY, area_below, height_moment, line_constant
 
 _ALONG = 1e-7
@@ -181,7 +182,7 @@ def reconstruct(c, work, g):  # type: ignore[no-untyped-def]
     m, alpha = work.m, work.alpha
     for i in range(g.n[0]):
         for j in range(g.n[1]):
-            first = (i + 2) * g.s[0] + (j + 2) * g.s[1] + 2
+            first = place(g, i, j, 0)
             for n in range(first, first + g.n[2]):
                 if EMPTY < c[n] < 1.0 - EMPTY:
                     m[0, n], m[1, n], m[2, n], alpha[n] = reconstruct_cell(c, n, g.s)

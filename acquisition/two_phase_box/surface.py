@@ -209,7 +209,6 @@ def _curvatures_of_heights(c, work, g, reach, most):  # type: ignore[no-untyped-
         for j in range(g.n[1]):
             for k in range(g.n[2]):
                 n = place(g, i, j, k)
-                kappa[n] = UNKNOWN
                 if _is_interface(c, n, g):
                     found = _curvature_of_cell(c, n, (i, j, k), _normal_of(c, work, n, g), g, reach)
                     if found < UNKNOWN:
@@ -233,7 +232,7 @@ def _other_curvatures(c, work, out, g, deep, most):  # type: ignore[no-untyped-d
 
 
 def find_curvature(c: FloatArray, work: Work, g: Grid, k_: Constants) -> None:
-    """κ of all cells of the interface, unknown elsewhere; planes and their middles must have been found.
+    """κ of all cells of the interface, into room that is unknown everywhere; planes and middles must have been found.
 
     By heights; where there are none, of the neighbours that have some, as Basilisk has it; else by normals.
     """
