@@ -232,9 +232,10 @@ def _other_curvatures(c, work, out, g, deep, most):  # type: ignore[no-untyped-d
 
 
 def find_curvature(c: FloatArray, work: Work, g: Grid, k_: Constants) -> None:
-    """κ of all cells of the interface, into room that is unknown everywhere; planes and middles must have been found.
+    """κ of all cells of the interface, into room that is unknown everywhere.
 
-    By heights; where there are none, of the neighbours that have some, as Basilisk has it; else by normals.
+    Planes and their middles must have been found. By heights; where there are none, of the neighbours that have
+    some, as Basilisk has it; else by normals.
     """
     # one cell deep it is the plane, which has heights and normals only
     deep = min(g.n) > 1
