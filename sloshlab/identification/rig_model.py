@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from collections import OrderedDict
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -18,6 +17,7 @@ from sloshlab.conditioning.combined_channels import weights_by_noise
 from sloshlab.errors import AnalysisError, SloshlabError
 from sloshlab.identification.case import CaseRun
 from sloshlab.identification.diagnosed_model import Readings, Request
+from sloshlab.identification.integration_steps import STEPS_PER_PERIOD, steps_per_sample
 from sloshlab.identification.release import AVERAGING, INSTANT, late_by
 from sloshlab.identification.rig_parameters import (
     FLUCTUATION,
@@ -44,11 +44,9 @@ from sloshlab.twin.simulated_channels import ORDER_OF_DERIVATIVE, channel_weight
 from sloshlab.twin.simulation import Simulation
 from sloshlab.twin.storage import save_twin
 from sloshlab.twin.structure_forces import MASS_ERROR
-from sloshlab.twin.terms import Term
 from sloshlab.twin.twin import Twin
 
 FloatArray = NDArray[np.float64]
-STEPS_PER_PERIOD: Final = 8.0
 _STEPS_PER_PERIOD_OF_A_RELEASE: Final = 12.0
 """Of the highest mode, which a release excites most.
 
@@ -57,17 +55,6 @@ of three beams.
 """
 _FINER_FOR_EVENTS: Final = 2.0
 """Factor where there are events: within longer steps friction may stop twice, and a contact open and close."""
-_STEPS_PER_FIRST_PERIOD: Final = 60.0
-"""Of the lowest mode: forces with memory need them."""
-MOST_STEPS_OF_MEMORY: Final = 32
-"""Per sample; a loop that yields within a 64th of the way between two samples is dry friction to a recording."""
-_LARGEST_STEP_OF_MEMORY: Final = 2.0
-"""Over the time in which it forgets at the largest speed, where a loop has yielded; RK4 is stable up to 2.78."""
-_LEAST_STEPS_PER_S: Final = 500.0
-"""Of a tank that follows its measured motion: forces with a running mean need some tens of steps per cycle.
-
-At 64 Hz the memory of the liquid's damping was integrated in steps of a seventh of a cycle and diverged.
-"""
 _MOST_BYTES_AT_ONCE: Final = 2e8
 """Of the motions of lanes that are simulated together; answers do not depend on it."""
 
@@ -501,78 +488,6 @@ def _relative_share(name: str, truth: Mapping[str, FloatArray], values: Mapping[
     n = len(cells)
     shares = [values.get(f"share of {cell}", 1 / n) for cell in cells[:-1]]
     return n * (shares[cells.index(name)] if name != cells[-1] else 1.0 - sum(shares))
-
-
-def steps_per_sample(
-    twin: Twin,
-    sampling_rate_hz: float,
-    per_period: float = STEPS_PER_PERIOD,
-    speed_m_per_s: float = 0.0,
-) -> int:
-    """Integration steps that follow every mode within the band of a recording, and forces with memory.
-
-    Parameters
-    ----------
-    twin : Twin
-    sampling_rate_hz : float
-    per_period : float, optional
-        Of the highest mode.
-    speed_m_per_s : float, optional
-        The largest of the place where forces act, for memories that forget with the way.
-
-    Raises
-    ------
-    AnalysisError
-        If a memory forgets faster than steps can follow.
-    """
-    least = steps_of_memory(twin.terms, sampling_rate_hz, speed_m_per_s)
-    if twin.structure is None:
-        return max(least, math.ceil(_LEAST_STEPS_PER_S / sampling_rate_hz))
-    frequencies = twin.structure.frequencies_hz
-    needed = max(per_period * float(frequencies.max()), _STEPS_PER_FIRST_PERIOD * float(frequencies.min()))
-    return max(least, min(1000, math.ceil(needed / sampling_rate_hz)))
-
-
-def steps_of_memory(terms: Sequence[Term], sampling_rate_hz: float, speed_m_per_s: float) -> int:
-    """Steps that follow memories which forget with the way; one where there are none.
-
-    A power of two, so that twins that differ a little are simulated side by side.
-
-    Parameters
-    ----------
-    terms : sequence of Term
-    sampling_rate_hz : float
-    speed_m_per_s : float
-        The largest of their place.
-
-    Raises
-    ------
-    AnalysisError
-        If `MOST_STEPS_OF_MEMORY` would be too few: in steps that long a loop overshoots the force at which it
-        yields, turns in every step, and is no loop any more.
-    """
-    needed = steps_needed(terms, sampling_rate_hz, speed_m_per_s)
-    if needed > MOST_STEPS_OF_MEMORY:
-        raise AnalysisError(
-            "a force with memory",
-            got=f"a need of {needed:.0f} steps between two samples to follow how it yields",
-            allowed=f"at most {MOST_STEPS_OF_MEMORY}",
-            remedy="describe it as dry friction, or sample faster",
-        )
-    return int(2 ** math.ceil(math.log2(needed)))
-
-
-def steps_needed(terms: Sequence[Term], sampling_rate_hz: float, speed_m_per_s: float) -> float:
-    """The same without an upper limit, and not a power of two.
-
-    Parameters
-    ----------
-    terms : sequence of Term
-    sampling_rate_hz : float
-    speed_m_per_s : float
-    """
-    fastest = max((term.memory_rate(speed_m_per_s) for term in terms), default=0.0)
-    return max(fastest / (_LARGEST_STEP_OF_MEMORY * sampling_rate_hz), 1.0)
 
 
 def corrected(run: CaseRun, undone: Sequence[SensorFault], driving: Sequence[str]) -> xr.Dataset:

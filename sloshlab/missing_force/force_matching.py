@@ -21,7 +21,7 @@ from scipy.optimize import differential_evolution, least_squares
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.diagnosed_model import EXACT
 from sloshlab.identification.effort import Effort
-from sloshlab.identification.rig_model import MOST_STEPS_OF_MEMORY, steps_needed, steps_per_sample
+from sloshlab.identification.integration_steps import MOST_STEPS_OF_MEMORY, steps_needed, steps_per_sample
 from sloshlab.missing_force.latent_force import (
     EITHER,
     STRUCTURE,

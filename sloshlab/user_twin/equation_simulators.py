@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import splev, splrep
 
 from sloshlab.errors import AnalysisError, InputError
-from sloshlab.identification.rig_model import steps_of_memory, steps_per_sample
+from sloshlab.identification.integration_steps import steps_of_memory, steps_per_sample
 from sloshlab.twin.excitation import free, recorded, recorded_for_equations
 from sloshlab.twin.lane_preparation import Lane
 from sloshlab.twin.motion import Motion

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Mapping, Sequence
 
 from sloshlab.errors import InputError
-from sloshlab.identification.rig_model import steps_per_sample
+from sloshlab.identification.integration_steps import steps_per_sample
 from sloshlab.twin.excitation import Excitation, free, recorded
 from sloshlab.twin.lane_preparation import Lane
 from sloshlab.twin.motion import Motion

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from recorded_oscillators import DAMPING, NOISE, OMEGA, RATE_HZ, decays, driven, motion, rig, run_of
 
-from sloshlab.errors import AnalysisError
-from sloshlab.identification import rig_model
+from sloshlab.identification import integration_steps, rig_model
 from sloshlab.identification.diagnosed_model import Request
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_physics.extension import NOTHING, Extension, SensorFault
@@ -207,26 +206,6 @@ def driving(model: RigModel) -> list[str]:
     return [f"gain of {name}" for name in model.driving(model.runs[0])]
 
 
-def test_steps_follow_how_fast_a_loop_yields() -> None:
-    """v ν/x_y: of 0.2 m/s and 0.1 mm 2000 a second, of exponent 2 twice as many.
-
-    A step lasts two of these times at most, and a power of two of them makes a sample.
-    """
-    linear = HYSTERESIS(stiffness_n_per_m=1e6, beta_gamma=9e3, beta_delta=1e3)
-    squared = HYSTERESIS(stiffness_n_per_m=1e6, beta_gamma=50.0, beta_delta=50.0, exponent=2.0)
-    assert linear.memory_rate(0.2) == pytest.approx(2000.0)
-    assert squared.memory_rate(0.2) == pytest.approx(4000.0)
-    assert rig_model.steps_of_memory([linear], 100.0, 0.2) == 16
-    assert rig_model.steps_of_memory([linear, squared], 100.0, 0.2) == 32
-    # a thousand steps
-    with pytest.raises(AnalysisError, match="1000 steps between two samples"):
-        rig_model.steps_of_memory([linear], 1.0, 0.2)
-    assert rig_model.steps_of_memory([linear], 1e4, 0.2) == rig_model.steps_of_memory([], 100.0, 0.2) == 1
-    # neither a spring nor a loop that opens forever yields
-    assert HYSTERESIS(stiffness_n_per_m=0.0, beta_gamma=1.0, beta_delta=0.0).memory_rate(1.0) == 0.0
-    assert HYSTERESIS(stiffness_n_per_m=5e4, beta_gamma=800.0, beta_delta=-1100.0).memory_rate(1.0) == 0.0
-
-
 def test_a_release_is_followed_by_its_own_speed(tmp_path: Path) -> None:
     """ω x₀ is the largest: eleven steps, which are sixteen, from three times as far as four that are enough."""
     model = RigModel(rig(tmp_path), tmp_path, decays())
@@ -243,4 +222,4 @@ def test_forces_that_average_over_a_cycle_have_steps_enough_at_low_rates(
     tmp_path: Path, rate_hz: float, n: int
 ) -> None:
     model = shaken(tmp_path, {})
-    assert rig_model.steps_per_sample(model.twin, rate_hz) == n
+    assert integration_steps.steps_per_sample(model.twin, rate_hz) == n

@@ -12,7 +12,8 @@ from recorded_oscillators import decays, effect, rig, run_of, surroundings
 from scipy.integrate import solve_ivp
 from slow_cases import slow_but
 
-from sloshlab.identification.rig_model import RigModel, steps_per_sample
+from sloshlab.identification.integration_steps import steps_per_sample
+from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_force.force_matching import ForceMatching, Match, matchings
 from sloshlab.missing_force.latent_force import (
     EITHER,
