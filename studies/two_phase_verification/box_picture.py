@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from acquisition.two_phase_box import checkpoint
 from acquisition.two_phase_box.simulation import TwoPhaseBox
 from pipelines.report.style import drawing_style, new_figure, png_bytes
+from pipelines.report.terminal import say
 from sloshlab.atomic_file import write_bytes
+from sloshlab.errors import SloshlabError
 
 FloatArray = NDArray[np.float64]
 
@@ -83,8 +85,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("run", type=Path, help="checkpoint of the box")
     parser.add_argument("figure", type=Path, help="PNG to write")
     chosen = parser.parse_args(arguments)
-    tank, _ = checkpoint.load_with_extra(chosen.run)
-    write_bytes(chosen.figure, box_figure(tank))
+    try:
+        tank, _ = checkpoint.load_with_extra(chosen.run)
+        write_bytes(chosen.figure, box_figure(tank))
+    except SloshlabError as error:
+        say(f"box_picture: {error}", error=True)
+        return 1
     return 0
 
 

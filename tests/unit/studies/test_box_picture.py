@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from acquisition.numerical_tank.tank import Box
 from acquisition.two_phase_box import checkpoint
@@ -26,3 +27,11 @@ def test_a_checkpoint_is_drawn(tmp_path: Path) -> None:
     checkpoint.save(TwoPhaseBox(TwoPhaseBoxSetup(filled_two_phase_tank(Box(0.04, 0.03, 0.03), 0.5, 8))), run)
     assert box_picture.main([str(run), str(picture)]) == 0
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_is_no_checkpoint_is_refused_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run, picture = tmp_path / "run.checkpoint", tmp_path / "box.png"
+    run.write_bytes(b"nothing of the kind")
+    assert box_picture.main([str(run), str(picture)]) == 1
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not picture.exists()
