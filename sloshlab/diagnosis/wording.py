@@ -16,7 +16,6 @@ from sloshlab.diagnosis.inference.posterior import NONE, UNKNOWN
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.diagnosis.inference.thresholds import NAMED
 from sloshlab.diagnosis.interval import Interval
-from sloshlab.identification.free_run_problem import run_of
 from sloshlab.identification.readiness import refuted_beliefs
 from sloshlab.missing_physics.candidate import Candidate, without_run
 from sloshlab.missing_physics.units import named_and_units
@@ -170,7 +169,7 @@ def refuted_statement(found: Findings, model: ScoredModel) -> str:
     model : ScoredModel
         What is named, or nothing missing.
     """
-    shared = [known for known in found.model.parameters if not run_of(known.name, found.model)]
+    shared = [known for known in found.model.parameters if not known.run]
     refuted = refuted_beliefs(model.fit.values, shared)
     corrected = dict.fromkeys(c.effect.corrects for c in model.fit.candidates if c.effect.corrects)
     return "".join(f"; what is believed of the {number} is refuted" for number in corrected) + "".join(

@@ -34,6 +34,10 @@ class BaselineParameter:
         Bounds of its deviation below and above in tolerances; beyond them something else is wrong.
     channel : str
         The only one whose reading it changes; empty where it may change several.
+    run : str
+        The only one to which it belongs; empty where it belongs to all.
+    is_damping : bool
+        Whether it is a loss of the structure or of the liquid.
     """
 
     name: str
@@ -44,6 +48,8 @@ class BaselineParameter:
     most_below: float = 4.0
     most_above: float = 4.0
     channel: str = ""
+    run: str = ""
+    is_damping: bool = False
 
     @property
     def bounds(self) -> tuple[float, float]:

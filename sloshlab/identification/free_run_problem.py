@@ -17,6 +17,7 @@ from sloshlab.identification.block_jacobian import BlockJacobian
 from sloshlab.identification.diagnosed_model import DiagnosedModel, Request
 from sloshlab.identification.effort import Effort
 from sloshlab.identification.observations import Observation
+from sloshlab.identification.owning_runs import owning_runs
 from sloshlab.missing_physics.candidate import Candidate, channels_of, extension_of
 from sloshlab.missing_physics.extension import Extension, left_out_of_drives
 
@@ -113,7 +114,8 @@ class _Number:
     low: float
     high: float
     channels: tuple[str, ...]
-    is_reading: bool
+    is_reading: bool = False
+    is_damping: bool = False
 
 
 class FreeRunProblem:
@@ -151,8 +153,10 @@ class FreeRunProblem:
         self.fixed = dict(fixed or {})
         present = {observation.run.name for run in self.runs for observation in run}
 
+        self._owners = owning_runs(model.parameters, self.candidates)
+
         def is_free(name: str) -> bool:
-            return name not in self.fixed and run_of(name, model) in ("", *present)
+            return name not in self.fixed and self.owner(name) in ("", *present)
 
         baseline = [_of_baseline(known) for known in model.parameters if is_free(known.name)]
         # An effect on a sensor that drives changes the motion and with it every channel.
@@ -170,8 +174,13 @@ class FreeRunProblem:
         )
         self._channels_changed = [number.channels for number in free]
         self._is_reading = np.array([number.is_reading for number in baseline], bool)
+        self._is_damping = [number.is_damping for number in free]
         ends = np.cumsum([0] + [observation.spectra.size for run in self.runs for observation in run])
         self._rows = [slice(int(first), int(end)) for first, end in pairwise(ends)]
+
+    def owner(self, name: str) -> str:
+        """The run to which a number belongs alone; empty where it belongs to all."""
+        return self._owners.get(name, "")
 
     def prior_cost(self, theta: FloatArray, inflation: float = 0.0) -> float:
         """What scaled parameters cost by their prior, zero where all are as believed.
@@ -317,7 +326,7 @@ class FreeRunProblem:
         """
         places, direction = [], 1.0 if forward else -1.0
         for column in columns:
-            is_effect, is_damping = column >= self.n_baseline, self.names[column].startswith("damping")
+            is_effect, is_damping = column >= self.n_baseline, self._is_damping[column]
             step = _COARSE_STEP if coarse and (is_effect or is_damping) else _STEP
             if is_effect:
                 # Relative to the parameter, which may have moved far from the start that scales it; an effect of
@@ -390,7 +399,7 @@ class FreeRunProblem:
         """Blocks that any of some parameters changes, and their observations run by run."""
         # The sparsity of the Jacobian: a release or an offset is simulated for its run alone, a gain for its
         # channel alone.
-        seen = [(run_of(self.names[column], self.model), self._channels_changed[column]) for column in columns]
+        seen = [(self.owner(self.names[column]), self._channels_changed[column]) for column in columns]
         blocks: list[int] = []
         runs: list[list[Observation]] = []
         n_before = 0
@@ -511,21 +520,15 @@ def _of_baseline(known: BaselineParameter) -> _Number:
         *known.bounds,
         (known.channel,) if known.channel else (),
         known.is_reading,
+        known.is_damping,
     )
 
 
 def _of_effect(candidate: Candidate, driving: Collection[str]) -> list[_Number]:
     channels = _only_channels(candidate, driving)
     return [
-        _Number(
-            f"{candidate.key}.{known.name}",
-            0.0,
-            candidate.scale(known.name),
-            *candidate.bounds(known),
-            channels,
-            False,
-        )
-        for known in candidate.effect.parameters
+        _Number(name, 0.0, candidate.scale(known.name), *candidate.bounds(known), channels)
+        for name, known in candidate.names.items()
     ]
 
 
@@ -576,18 +579,3 @@ def huber_cost(residual: FloatArray, limit: float = HUBER_LIMIT) -> float:
     size = np.abs(residual)
     within = np.minimum(size, limit)
     return float((within * (2 * size - within)).sum())
-
-
-def run_of(name: str, model: DiagnosedModel) -> str:
-    """The run to which a parameter belongs alone; empty where it belongs to all.
-
-    Parameters
-    ----------
-    name : str
-        Of the parameter.
-    model : DiagnosedModel
-    """
-    for run in model.runs:
-        if name.endswith((f"release of {run.name}", f" in {run.name}")):
-            return run.name
-    return ""

@@ -138,7 +138,7 @@ class RigModel:
             run.name: [
                 (parameter.name, parameter.believed)
                 for parameter in self.parameters
-                if not parameter.is_reading and self._belongs(parameter.name, run)
+                if not parameter.is_reading and parameter.run in ("", run.name)
             ]
             for run in self.runs
         }
@@ -180,13 +180,6 @@ class RigModel:
         """
         lane = self._lane(request)
         return simulated(lane.twin, lane.excitation, lane.start, lane.n_substeps).require_done()
-
-    def _belongs(self, parameter: str, run: CaseRun) -> bool:
-        """Whether a parameter of the motion belongs to this run or to all."""
-        for beginning in (RELEASE, FLUCTUATION):
-            if parameter.startswith(beginning):
-                return parameter == beginning + run.name
-        return True
 
     def save_extended(self, values: Mapping[str, float], candidates: Sequence[Candidate], path: Path) -> None:
         """Write `extended_twin` as a twin, and effects of sensors and actuators by their names."""

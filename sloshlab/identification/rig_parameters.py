@@ -124,18 +124,24 @@ def _run_parameters(each: RunOfRig) -> list[BaselineParameter]:
     # Liquid that moves chaotically never damps twice alike. One number for all runs would make the difference
     # physics.
     if each.liquid_fluctuates:
-        found.append(BaselineParameter(FLUCTUATION + run.name, 1.0, TOLERANCE_OF_FLUCTUATION))
+        fluctuation = FLUCTUATION + run.name
+        found.append(BaselineParameter(fluctuation, 1.0, TOLERANCE_OF_FLUCTUATION, run=run.name, is_damping=True))
     if run.is_free:
         start = each.initial_displacement_m
-        found.append(BaselineParameter(f"{RELEASE}{run.name}", start, 0.03 * abs(start) + 1e-5, "m"))
+        release = f"{RELEASE}{run.name}"
+        found.append(BaselineParameter(release, start, 0.03 * abs(start) + 1e-5, "m", run=run.name))
         uncertain_s = tolerance_s(run.attributes.sampling_rate_hz)
         instant = instant_s(run.recording)
-        found.append(BaselineParameter(f"{INSTANT}{run.name}", instant, uncertain_s, "s", is_reading=True))
+        found.append(
+            BaselineParameter(f"{INSTANT}{run.name}", instant, uncertain_s, "s", is_reading=True, run=run.name)
+        )
     for name in each.compared:
         if name.startswith("displacement"):
             offset = f"offset of {name} in {run.name}"
             size = float(np.nanmax(np.abs(run.recording[name].values)))
-            found.append(BaselineParameter(offset, 0.0, 0.01 * size, "m", is_reading=True, channel=name))
+            found.append(
+                BaselineParameter(offset, 0.0, 0.01 * size, "m", is_reading=True, channel=name, run=run.name)
+            )
     return found
 
 
@@ -151,7 +157,8 @@ def _structure_parameters(structure: Structure, *, moves: bool) -> list[Baseline
     for i in range(n):
         label = f"mode {i + 1}"
         found.append(BaselineParameter(f"frequency of {label}", 1.0, 0.02))
-        found.append(BaselineParameter(f"damping of {label}", 1.0, 0.2, most_above=_CLOSE_TOLERANCES))
+        damping = f"damping of {label}"
+        found.append(BaselineParameter(damping, 1.0, 0.2, most_above=_CLOSE_TOLERANCES, is_damping=True))
     found += [BaselineParameter(f"modal mass of mode {i + 1}", 1.0, 0.01) for i in range(n)]
     if moves:
         found += [

@@ -119,6 +119,8 @@ class EffectParameter:
         What is believed of it; without one, two decades about its largest start.
     each_run : bool
         Whether every run has one of its own, as the phase of a machine that runs by itself: ``NAME in RUN``.
+    run : str
+        The only one to which it belongs, once `Effect.of_runs` has made one for each; else empty.
     tolerance : callable or None
         (surroundings) → scale of its steps in a fit, where that is not its size.
     """
@@ -128,6 +130,7 @@ class EffectParameter:
     high: float
     range: Range | None = None
     each_run: bool = False
+    run: str = ""
     tolerance: Callable[[Surroundings], float] | None = None
 
 
@@ -312,7 +315,7 @@ class Effect:
             return self
         parameters = [known for known in self.parameters if not known.each_run]
         parameters += [
-            replace(known, name=in_run(known.name, run), each_run=False)
+            replace(known, name=in_run(known.name, run), each_run=False, run=run)
             for known in self.parameters
             if known.each_run
             for run in runs
@@ -351,6 +354,11 @@ class Candidate:
     def key(self) -> str:
         """Name that tells candidates of one case apart."""
         return ".".join(part for part in (self.effect.block, self.effect.name, self.channel) if part)
+
+    @property
+    def names(self) -> dict[str, EffectParameter]:
+        """Its numbers by the names that they have in a fit."""
+        return {f"{self.key}.{known.name}": known for known in self.effect.parameters}
 
     def reduces_to(self, other: Candidate) -> bool:
         """Whether another effect at the same place is nested in this one."""

@@ -30,6 +30,7 @@ from sloshlab.user_twin.simulators import simulator_of
 
 FloatArray = NDArray[np.float64]
 _MOST_KEPT: Final = 400
+_UNITS_OF_DAMPING: Final = ("N s m-1", "kg s-1", "N m s rad-1")
 
 
 class UserTwinModel:
@@ -237,7 +238,7 @@ class UserTwinModel:
         found = []
         for parameter in self.described.parameters:
             found += [
-                self._parameter(parameter, f"{parameter.name} in {run.name}")
+                self._parameter(parameter, f"{parameter.name} in {run.name}", run.name)
                 for run in self.runs
                 if parameter.each_run
             ]
@@ -246,7 +247,11 @@ class UserTwinModel:
         if isinstance(self.described, EquationTwin):
             found += [
                 BaselineParameter(
-                    f"{name} in {run.name}", self._starts[run.name][name], state.tolerance, state.units
+                    f"{name} in {run.name}",
+                    self._starts[run.name][name],
+                    state.tolerance,
+                    state.units,
+                    run=run.name,
                 )
                 for name, state in self.described.starts.items()
                 if state.tolerance
@@ -263,14 +268,22 @@ class UserTwinModel:
                         shown.offset_tolerance,
                         shown.units,
                         is_reading=True,
+                        run=run.name,
                     )
                     for run in self.runs
                 ]
         return found
 
     @staticmethod
-    def _parameter(parameter: Parameter, name: str) -> BaselineParameter:
-        return BaselineParameter(name, float(parameter.believed), float(parameter.tolerance), parameter.units)
+    def _parameter(parameter: Parameter, name: str, run: str = "") -> BaselineParameter:
+        return BaselineParameter(
+            name,
+            float(parameter.believed),
+            float(parameter.tolerance),
+            parameter.units,
+            run=run,
+            is_damping=parameter.units in _UNITS_OF_DAMPING,
+        )
 
     def _check_channels(self, run: CaseRun) -> None:
         present = channels(run.recording)

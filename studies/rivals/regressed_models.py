@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from sloshlab.diagnosis.inference.scored_model import robust_squares
 from sloshlab.errors import MissingExtraError
-from sloshlab.identification.free_run_problem import HUBER_LIMIT, FreeRunProblem, robust_weights, run_of
+from sloshlab.identification.free_run_problem import HUBER_LIMIT, FreeRunProblem, robust_weights
 from studies.rivals.baseline import RetunedBaseline
 from studies.rivals.force_targets import Target, targets_of
 from studies.rivals.libraries import LIBRARIES, names_of
@@ -203,7 +203,7 @@ class GaussNewtonStep:
         whole = problem.residual(theta)
         derivatives = problem.jacobian(theta, whole, range(theta.size))
         self._n_own = theta.size
-        self._own_of_run = [run_of(name, found.model) for name in problem.names]
+        self._own_of_run = [problem.owner(name) for name in problem.names]
         self._prior, self._pull = problem.prior_weights(theta), problem.prior_weights(theta) * theta
         self._first_of = np.cumsum([0, *(len(LIBRARIES[target.place]) for target in targets)]) + self._n_own
         self._runs = [run[0].run.name for run in found.runs]

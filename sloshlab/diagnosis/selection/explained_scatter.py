@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from sloshlab.diagnosis.selection.fitted_runs import values_of_runs
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.diagnosed_model import DiagnosedModel
-from sloshlab.identification.free_run_problem import FreeRunFit, run_of
+from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.identification.observations import (
     Observation,
     with_scatter,
@@ -66,8 +66,7 @@ class ExplainedScatter:
         ----------
         fit : FreeRunFit
         """
-        own = tuple(f"{candidate.key}." for candidate in fit.candidates)
-        return bool(own) and any(name.startswith(own) and run_of(name, self._model) for name in fit.values)
+        return any(known.run for candidate in fit.candidates for known in candidate.effect.parameters)
 
     def renew(self, fit: FreeRunFit) -> bool:
         """Take the noise about a fit from here on, if it may explain what repeats differ by; whether it may.

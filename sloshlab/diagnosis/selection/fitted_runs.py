@@ -14,8 +14,9 @@ from sloshlab.diagnosis.selection.missing_forces import latent_forces, missing_f
 from sloshlab.identification.diagnosed_model import DiagnosedModel
 from sloshlab.identification.effort import Effort
 from sloshlab.identification.free_run_fit import N_REFINED, fitted, fitted_baseline
-from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, faulty_channels, run_of
+from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, faulty_channels
 from sloshlab.identification.observations import Observation, without_scatter
+from sloshlab.identification.owning_runs import owning_runs
 from sloshlab.missing_physics.candidate import Candidate
 from sloshlab.missing_physics.prior import drawn
 
@@ -108,7 +109,8 @@ def values_of_runs(
     effort : Effort, optional
         To which the simulations are added.
     """
-    shared = {name: value for name, value in fit.values.items() if not run_of(name, model)}
+    owners = owning_runs(model.parameters, fit.candidates)
+    shared = {name: value for name, value in fit.values.items() if name not in owners}
     values = dict(fit.values)
     for run in runs:
         problem = FreeRunProblem(model, [run], fit.candidates, shared, effort)
@@ -118,7 +120,7 @@ def values_of_runs(
             own, _ = fits(problem, start=start, n_iterations=3)
             # In this problem the numbers of other runs rest where they start, not where the fit has them.
             here = run[0].run.name
-            values |= {name: value for name, value in own.values.items() if run_of(name, model) == here}
+            values |= {name: value for name, value in own.values.items() if owners.get(name) == here}
     return values
 
 
@@ -161,10 +163,8 @@ def places_in_runs(problem: FreeRunProblem, candidate: Candidate) -> dict[str, f
     """
     return {
         name: candidate.scale(known.name) / DRAWS_PER_NUMBER
-        for known in candidate.effect.parameters
-        if known.name not in candidate.sizes
-        and (name := f"{candidate.key}.{known.name}") in problem.names
-        and run_of(name, problem.model)
+        for name, known in candidate.names.items()
+        if known.run and known.name not in candidate.sizes and name in problem.names
     }
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
 from sloshlab.identification.free_run_fit import fitted, stages_for
-from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem, run_of
+from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.missing_physics.candidate import Candidate
 
 HopelessCost = Callable[[float], float]
@@ -46,7 +46,7 @@ def full_fit(
     problem = runs.problem_of(coarse)
     fit = at_its_optimum(problem, {**base.values, **coarse.values}, hopeless_cost)
     # What an effect has of its own in a run, such as an instant.
-    own = {run_of(name, runs.model) for name in problem.names[problem.n_baseline :]}
+    own = {problem.owner(name) for name in problem.names[problem.n_baseline :]}
     alone = [run for run in runs.runs if run[0].run.is_free or run[0].run.name in own]
     if fit.trouble or not alone or problem.is_down_to_noise(fit):
         return fit

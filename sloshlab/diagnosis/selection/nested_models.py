@@ -29,7 +29,7 @@ def own_numbers(fit: FreeRunFit, effect: Candidate) -> dict[str, float]:
     fit : FreeRunFit
     effect : Candidate
     """
-    own = {f"{effect.key}.{parameter.name}" for parameter in effect.effect.parameters}
+    own = effect.names
     return {name: value for name, value in fit.values.items() if name in own}
 
 

@@ -149,7 +149,7 @@ def _beside(
         extended = runs.problem((*base.fit.candidates, candidate))
         thetas = [extended.theta_of({**base.fit.values, **start}) for start in sets]
         # The base is the extended model whose last effect has no size: a sensor changes its channel alone.
-        own = [i for i, name in enumerate(extended.names) if name.startswith(f"{candidate.key}.")]
+        own = [i for i, name in enumerate(extended.names) if name in candidate.names]
         moved = zip(sets, extended.residuals_moved(thetas, own, tested[left_out[key]].residual), strict=True)
         found: list[_Promise] = []
         # As many as are simulated together, so that few residuals are held at once.
@@ -280,11 +280,9 @@ def most_promising(proposed: Sequence[Proposal]) -> dict[str, list[dict[str, flo
     for proposal in proposed:
         by_key.setdefault(proposal.candidates[-1].key, []).append(proposal)
     for key, own in by_key.items():
+        names = own[0].candidates[-1].names
         best = {int(np.argmin([proposal.predicted[k] for proposal in own])) for k in range(len(own[0].predicted))}
-        found[key] = [
-            {name: value for name, value in own[i].start.items() if name.startswith(f"{key}.")}
-            for i in sorted(best)
-        ]
+        found[key] = [{name: value for name, value in own[i].start.items() if name in names} for i in sorted(best)]
     return found
 
 

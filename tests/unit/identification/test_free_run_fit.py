@@ -36,7 +36,6 @@ from sloshlab.identification.free_run_problem import (
     FreeRunProblem,
     huber_cost,
     robust_weights,
-    run_of,
 )
 from sloshlab.identification.observations import observations
 from sloshlab.identification.rig_model import RigModel
@@ -457,7 +456,7 @@ def test_every_reading_that_is_simulated_is_counted_once(tmp_path: Path) -> None
     theta = problem.theta_of({})
     at = problem.residual(theta)
     assert effort.n_readings == of_a_run * len(runs)
-    own = next(i for i, name in enumerate(problem.names) if run_of(name, problem.model) == runs[0].name)
+    own = next(i for i, name in enumerate(problem.names) if problem.owner(name) == runs[0].name)
     problem.jacobian(theta, at, [own])
     assert effort.n_readings == of_a_run * (len(runs) + 1)
     FreeRunProblem(plain.model, plain.runs, (), plain.fixed, effort).residual(theta)
