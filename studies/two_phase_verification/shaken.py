@@ -275,6 +275,10 @@ COARSE: Final = tuple(replace(case, cells_per_height=16) for case in MAP)
 RESOLUTION: Final = tuple(
     Shaking(2.04, 10.7, 30, cells_per_height=cells, seed=seed) for cells in (16, 24, 32, 48) for seed in (0, 1, 2)
 )
+WEAK_RESOLUTION: Final = (
+    *(Shaking(0.5, 11.4, 100, cells_per_height=cells, seed=seed) for cells in (16, 48) for seed in (0, 1, 2)),
+    *(Shaking(1.0, 11.4, 60, cells_per_height=cells) for cells in (16, 24, 48)),
+)
 _WEAK: Final = (Shaking(0.5, 11.4, 100, 16), Shaking(1.0, 11.4, 60, 16))
 CAUSES: Final = (
     *(replace(case, layer_frequency_hz=case.frequency_hz / 2) for case in _WEAK),
@@ -301,6 +305,7 @@ POINTS: Final = {
     "map": MAP,
     "coarse": COARSE,
     "resolution": RESOLUTION,
+    "weak_resolution": WEAK_RESOLUTION,
     "causes": CAUSES,
     "campaign": CAMPAIGN,
     "beside_box": BESIDE_BOX,
