@@ -226,7 +226,8 @@ def onset(
             numbers = np.linalg.solve(squares + lift * np.eye(3), motion[inside].T @ force[inside])
             top = inside[level[inside] > edges[upper - 1]]
             rest = force[top] - motion[top] @ numbers
-            if np.sqrt(np.mean(rest**2)) > _NOISE_ONLY * noise_n:
+            # A draw of stretches may have none of a level, which then tells nothing.
+            if top.size and np.sqrt(np.mean(rest**2)) > _NOISE_ONLY * noise_n:
                 return count
             count = upper
         return count
