@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from threadpoolctl import threadpool_limits
+
 from pipelines.diagnosis.results import Diagnosis
 from pipelines.diagnosis.workers import Workers
 from pipelines.inputs.recordings import RunSource, recording_of
@@ -151,6 +153,9 @@ def opened_recordings(name: str, runs: Sequence[RunSource], rig: RigSource | Non
     return _examined(case, (*([] if rig is None else [rig]), *runs))
 
 
+# Workers keep every core busy; threads of BLAS beside them wait for one another (a third of the processor), and
+# round sums by how many they are.
+@threadpool_limits.wrap(limits=1)  # type: ignore[untyped-decorator]
 def diagnosed(
     opened: OpenedCase,
     *,
