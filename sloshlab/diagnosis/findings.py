@@ -157,10 +157,9 @@ def findings_of(
     with_effects = sorted((fit for fit in fits if fit.candidates), key=lambda fit: fit.cost)
     believed_fit = FreeRunFit((), problem.values(problem.theta_of(model.believed)), 0.0, 0.0)
     score = Scoring(model, fitting, held_out, nothing, case.names_by_test())
-    believed, retuned = score.required(believed_fit, "as believed"), score.required(nothing, "retuned")
     # Others are too far behind to have any probability; a few of them say by how much.
     n_scored = min(max(sum(map(known.may_win, with_effects)), N_KEPT), _MOST_SCORED)
-    explanations = score.explaining(with_effects[:n_scored], retuned, runs.effort)
+    believed, retuned, explanations = score.beside(believed_fit, nothing, with_effects[:n_scored], runs.effort)
     return Findings(
         case,
         model,
@@ -216,11 +215,23 @@ class Scoring:
         """A model; None where it does not reach the end of a run that it was not fitted to."""
         return self._scored(fit, self._whitened(fit), nothing)
 
-    def explaining(self, fits: Sequence[FreeRunFit], nothing: ScoredModel, effort: Effort) -> list[ScoredModel]:
-        """The same of several, those left out that do not reach an end."""
-        found = zip(fits, effort.spent_on(self.model.executor, self._whitened, fits), strict=True)
-        models = [self._scored(fit, whitened_runs, nothing) for fit, whitened_runs in found]
-        return [model for model in models if model is not None]
+    def beside(
+        self, believed: FreeRunFit, nothing: FreeRunFit, others: Sequence[FreeRunFit], effort: Effort
+    ) -> tuple[ScoredModel, ScoredModel, list[ScoredModel]]:
+        """The baseline as believed and retuned, and others beside it but those that do not reach an end.
+
+        Raises
+        ------
+        AnalysisError
+            If the baseline does not reach the end of a run that it was not fitted to.
+        """
+        # All at once, so that no worker waits while the baseline is fitted to runs that were held out.
+        fits = [believed, nothing, *others]
+        of_believed, of_nothing, *of_others = effort.spent_on(self.model.executor, self._whitened, fits)
+        as_believed = _required(self._scored(believed, of_believed, None), "as believed")
+        retuned = _required(self._scored(nothing, of_nothing, None), "retuned")
+        models = [self._scored(fit, each, retuned) for fit, each in zip(others, of_others, strict=True)]
+        return as_believed, retuned, [model for model in models if model is not None]
 
     def _whitened(self, fit: FreeRunFit) -> tuple[dict[str, float], _Residuals] | None:
         """Values in all runs, and of each run residuals and by what diverging motions differ."""
@@ -243,11 +254,12 @@ class Scoring:
 
     def required(self, fit: FreeRunFit, which: str) -> ScoredModel:
         """The same of the baseline, without which nothing can be compared."""
-        found = self.of(fit)
-        if found is None:
-            raise AnalysisError(
-                f"the twin {which}",
-                got="does not reach the end of every held-out run",
-                remedy="leave that run out",
-            )
-        return found
+        return _required(self.of(fit), which)
+
+
+def _required(found: ScoredModel | None, which: str) -> ScoredModel:
+    if found is None:
+        raise AnalysisError(
+            f"the twin {which}", got="does not reach the end of every held-out run", remedy="leave that run out"
+        )
+    return found
