@@ -77,7 +77,8 @@ def hidden_effects(
     def of_candidate(candidate: Candidate) -> tuple[dict[str, float], float] | None:
         # In the noise of the baseline, about which its posterior is quadratic.
         extended = runs.problem((*fit.candidates, candidate), problem.faulty)
-        own = [i for i, name in enumerate(extended.names) if name in candidate.names]
+        names = candidate.names
+        own = [i for i, name in enumerate(extended.names) if name in names]
         spacings = places_in_runs(extended, candidate)
         ranges = {prior.name: prior.high - prior.low for prior in candidate.prior}
         chosen_among = sum(log(max(ranges[name] / spacing, 1.0)) for name, spacing in spacings.items())

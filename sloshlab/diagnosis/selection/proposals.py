@@ -149,7 +149,8 @@ def _beside(
         extended = runs.problem((*base.fit.candidates, candidate))
         thetas = [extended.theta_of({**base.fit.values, **start}) for start in sets]
         # The base is the extended model whose last effect has no size: a sensor changes its channel alone.
-        own = [i for i, name in enumerate(extended.names) if name in candidate.names]
+        names = candidate.names
+        own = [i for i, name in enumerate(extended.names) if name in names]
         moved = zip(sets, extended.residuals_moved(thetas, own, tested[left_out[key]].residual), strict=True)
         found: list[_Promise] = []
         # As many as are simulated together, so that few residuals are held at once.
