@@ -31,6 +31,7 @@ from sloshlab.user_twin.simulators import simulator_of
 FloatArray = NDArray[np.float64]
 _MOST_KEPT: Final = 400
 _UNITS_OF_DAMPING: Final = ("N s m-1", "kg s-1", "N m s rad-1")
+"""By which losses are told: a user calls them as they like."""
 
 
 class UserTwinModel:
