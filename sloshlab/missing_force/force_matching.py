@@ -105,7 +105,7 @@ class ForceMatching:
     ) -> None:
         self._effort, self._n_samples = effort or Effort(), sum(force.force_n.size for force in forces)
         self._ways = [_Way(force) for force in forces]
-        self._doubled = [_Way(force, 2.0) for force in forces]
+        self._halved = [_Way(force, 0.5) for force in forces]
         self._shown = [ShownForces(forces, [forces]), *([] if undivided is None else [undivided])]
         missing = np.concatenate([shown.missing for shown in self._shown])
         self.power = float(missing @ missing)
@@ -183,15 +183,15 @@ class ForceMatching:
         candidate : Candidate
         numbers : mapping
         """
-        twin = force_alone(candidate, numbers)
+        twin = self._followed(candidate, numbers)
         if twin is None:
             return False
-        for way, doubled in zip(self._ways, self._doubled, strict=True):
-            one, two = motions([each.lane(twin) for each in (way, doubled)])
-            if not (_is_done(one) and _is_done(two)):
+        for way, halved in zip(self._ways, self._halved, strict=True):
+            one, half = motions([each.lane(twin) for each in (way, halved)])
+            if not (_is_done(one) and _is_done(half)):
                 continue
-            changes = [each.tank_force_n - each.tank_force_n.mean() for each in (one, two)]
-            if np.linalg.norm(changes[1] - 2.0 * changes[0]) > _EXACTLY * np.linalg.norm(two.tank_force_n):
+            changes = [each.tank_force_n - each.tank_force_n.mean() for each in (one, half)]
+            if np.linalg.norm(changes[0] - 2.0 * changes[1]) > _EXACTLY * np.linalg.norm(one.tank_force_n):
                 return True
         return False
 

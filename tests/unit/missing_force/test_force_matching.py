@@ -12,9 +12,9 @@ from recorded_oscillators import decays, effect, rig, run_of, surroundings
 from scipy.integrate import solve_ivp
 from slow_cases import slow_but
 
-from sloshlab.identification.integration_steps import steps_per_sample
+from sloshlab.identification.integration_steps import MOST_STEPS_OF_MEMORY, steps_needed, steps_per_sample
 from sloshlab.identification.rig_model import RigModel
-from sloshlab.missing_force.force_matching import ForceMatching, Match, matchings
+from sloshlab.missing_force.force_matching import ForceMatching, Match, force_alone, matchings
 from sloshlab.missing_force.latent_force import (
     EITHER,
     STRUCTURE,
@@ -334,6 +334,30 @@ def test_what_is_linear_in_the_motion_is_not_compared(tmp_path: Path, key: str, 
     motion = motion_of(0.003)
     matching = ForceMatching([latent(np.sin(2 * OMEGA * TIME), motion, "run_1")])
     assert matching.compares(known, known.starts()[0]) is compares
+
+
+def test_a_loop_that_steps_just_follow_is_compared_and_a_faster_one_is_no_force(tmp_path: Path) -> None:
+    """No multiple of the recorded motion may ask for more steps than this one, which may take all there are."""
+    known = candidate(tmp_path, "structure.hysteresis")
+    motion = motion_of(0.003)
+    matching = ForceMatching([latent(np.sin(2 * OMEGA * TIME), motion, "run_1")])
+
+    def yielding(times: float) -> dict[str, float]:
+        numbers = known.starts()[0]
+        yields = {name: times * value for name, value in numbers.items() if ".beta_" in name}
+        assert len(yields) == 2
+        return {**numbers, **yields}
+
+    def is_followed(times: float) -> bool:
+        twin = force_alone(known, yielding(times))
+        assert twin is not None
+        speed = float(np.abs(motion[:, 1]).max())
+        return steps_needed(twin.terms, RATE_HZ, speed) <= MOST_STEPS_OF_MEMORY
+
+    fastest = max(times for times in np.geomspace(1.0, 1e4, 400) if is_followed(times))
+    assert not is_followed(1.5 * fastest)
+    assert matching.compares(known, yielding(fastest))
+    assert not matching.compares(known, yielding(1.5 * fastest))
 
 
 def test_a_multiple_stays_within_the_bounds_of_every_size(tmp_path: Path) -> None:
