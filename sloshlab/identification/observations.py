@@ -367,7 +367,8 @@ def with_scatter(
     Notes
     -----
     The scatter about the mean of the repeats is averaged over three blocks and nine bands; it is never taken as
-    less than what is steady in its band, or than the noise of the sensor.
+    less than what is steady in its band, or than the noise of the sensor. Repeats may have left out other bands
+    (`within_informative_bands`): beyond those that all keep it is that of the last of these.
     """
     n = len(group)
     scatter: dict[str, FloatArray] = {}
@@ -375,12 +376,14 @@ def with_scatter(
         name = observation.channel
         parts = [
             residual[name]
-            for residual in residuals
-            if name in residual and residual[name].shape == observation.spectra.shape
+            for repeat, residual in zip(group, residuals, strict=True)
+            for each in repeat
+            if each.channel == name in residual and _is_comparable(each, observation)
         ]
         if len(parts) != n:
             continue
-        stacked = np.stack(parts)
+        n_kept = min(part.shape[1] for part in parts)
+        stacked = np.stack([part[:, :n_kept] for part in parts])
         # About the mean of the repeats, not about zero: what the simulation misses in every repeat alike stays
         # visible, and the chaos of a liquid does not count.
         about = ((stacked - stacked.mean(axis=0)) ** 2).sum(axis=0) / (n - 1)
@@ -389,13 +392,26 @@ def with_scatter(
         scatter[name] = np.maximum(local, _steady_noise(about, n - 1))
     return [
         [
-            _weighted(observation, np.maximum(scatter[observation.channel], observation.variance))
+            _weighted(
+                observation, np.maximum(_up_to(scatter[observation.channel], observation), observation.variance)
+            )
             if observation.channel in scatter
             else observation
             for observation in repeat
         ]
         for repeat in group
     ]
+
+
+def _is_comparable(one: Observation, other: Observation) -> bool:
+    """Whether coefficients are of the same times and frequencies, as far as both keep them."""
+    return one.n_bands == other.n_bands and one.spectra.shape[0] == other.spectra.shape[0]
+
+
+def _up_to(scatter: FloatArray, observation: Observation) -> FloatArray:
+    """For the bands of one repeat: less than all that are known, or more, which have the last one's."""
+    n = observation.spectra.shape[1]
+    return np.pad(scatter[:, :n], ((0, 0), (0, max(n - scatter.shape[1], 0))), mode="edge")
 
 
 def _steady_noise(about: FloatArray, n_degrees: int) -> FloatArray:

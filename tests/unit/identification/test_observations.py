@@ -216,6 +216,40 @@ def test_residuals_of_one_run_tell_its_noise_down_to_that_of_the_sensor() -> Non
     np.testing.assert_allclose(of_single.variance, expected)
 
 
+def kept(observation: Observation, n: int) -> Observation:
+    """The same without its upper bands, as where only noise was there."""
+    return replace(
+        observation,
+        spectra=observation.spectra[:, :n],
+        variance=observation.variance[:, :n],
+        n_transformed=observation.n_bands,
+    )
+
+
+def test_repeats_that_keep_other_bands_scatter_in_those_that_both_keep() -> None:
+    """Noise of which sensors say nothing must not come back as a mismatch because one repeat kept a band more."""
+    generator = np.random.default_rng(10)
+    group = [observations(run(TONE, noise=0.02), ["acceleration_tip"]) for _ in range(40)]
+    n_blocks, n_bands = group[0][0].spectra.shape
+    n_kept = [n_bands // 2 + 10 * (k % 2) for k in range(len(group))]
+    raw = [0.5 * generator.normal(size=(n_blocks, n)) for n in n_kept]
+    some = [[kept(each[0], n)] for each, n in zip(group, n_kept, strict=True)]
+    weighted = with_scatter(some, [{"acceleration_tip": residual} for residual in raw])
+    for [observation], n in zip(weighted, n_kept, strict=True):
+        assert observation.variance.shape == (n_blocks, n)
+        assert np.median(observation.variance) == pytest.approx(0.25, rel=0.05)
+    [fewer], [more] = weighted[:2]
+    np.testing.assert_array_equal(more.variance[:, : n_kept[0]], fewer.variance)
+    np.testing.assert_array_equal(more.variance[:, n_kept[0] :], np.repeat(fewer.variance[:, -1:], 10, axis=1))
+    # one of another number of stretches of time is of another length, and says nothing
+    longer = [*some, [kept(observations(run(np.tile(TONE, 2), noise=0.02), ["acceleration_tip"])[0], n_kept[0])]]
+    raw.append(np.zeros(longer[-1][0].spectra.shape))
+    for [before], [after] in zip(
+        longer, with_scatter(longer, [{"acceleration_tip": r} for r in raw]), strict=True
+    ):
+        np.testing.assert_array_equal(after.variance, before.variance)
+
+
 def test_an_equal_error_in_all_repeats_is_no_scatter() -> None:
     """What the model misses in every repeat alike must stay visible."""
     group = [observations(run(TONE, noise=0.02), ["acceleration_tip"]) for _ in range(3)]
