@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from sealed_trial.scoring.mark import Mark
+from sloshlab.missing_physics.units import in_words, named_and_units
 
 _BAR: Final = 40
 _JUDGED: Final = {
@@ -45,7 +46,7 @@ def truth_sentence(truth: Mapping[str, Any]) -> str:
     'nothing'
     >>> friction = {"name": "coulomb_friction", "block": "structure", "parameters": {"force_n": 0.31}}
     >>> truth_sentence({"effects": [friction], "details": {}})
-    'coulomb friction (structure), force_n 0.31'
+    'Coulomb friction (structure), force 0.31 N'
     """
     if not truth["effects"]:
         nuisance = truth["details"].get("nuisance", "none")
@@ -56,8 +57,13 @@ def truth_sentence(truth: Mapping[str, Any]) -> str:
 
 def _effect_words(effect: Mapping[str, Any]) -> str:
     place = effect.get("channel") or effect["block"]
-    numbers = "".join(f", {name} {value:.3g}" for name, value in effect["parameters"].items())
-    return f"{effect['name'].replace('_', ' ')} ({place}){numbers}"
+    numbers = "".join(f", {_number_in_words(name, value)}" for name, value in effect["parameters"].items())
+    return f"{in_words(effect['name'])} ({place}){numbers}"
+
+
+def _number_in_words(name: str, value: float) -> str:
+    words, units = named_and_units(name)
+    return f"{words} {value:.3g}{f' {units}' if units else ''}"
 
 
 def number_lines(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> list[str]:

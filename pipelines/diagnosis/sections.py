@@ -15,6 +15,7 @@ from pipelines.report.page import Page
 from pipelines.report.sections import FigurePlan, SectionPlan
 from pipelines.report.tables import Table, consistency_tables, provenance_table
 from sloshlab import __version__
+from sloshlab.missing_physics.units import in_words
 
 _TRANSFORM = Citation(
     "short-time spectra",
@@ -106,9 +107,7 @@ def _sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
     verdict, found = diagnosis.verdict, diagnosis.findings
     lines = [verdict.statement, f"Which experiment next: {next_experiment(diagnosis)}."]
     names = [(name, p) for name, p in verdict.probabilities.items() if p >= 0.005][:4]
-    lines.append(
-        "Probabilities: " + ", ".join(f"{name.replace('_', ' ')} {100 * p:.0f} %" for name, p in names) + "."
-    )
+    lines.append("Probabilities: " + ", ".join(f"{in_words(name)} {100 * p:.0f} %" for name, p in names) + ".")
     lines.append(
         f"{len(found.case.runs)} runs, {len(found.split.fitting)} fitted and "
         f"{len(found.split.held_out)} held out; {found.n_candidates} effects at all places were tried, "

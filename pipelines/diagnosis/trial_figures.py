@@ -21,6 +21,7 @@ from pipelines.report.style import (
 from sealed_trial.composition import CLASSES
 from sealed_trial.scoring.mark import COLUMNS
 from sealed_trial.scoring.score import Gain, Score
+from sloshlab.missing_physics.units import in_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -119,7 +120,7 @@ def _with_pairs_together(truth: str, answers: Mapping[str, int]) -> Counter[str]
 
 
 def _words(name: str) -> str:
-    return name.replace("_", " ").replace("+", " + ")
+    return in_words(name.replace("+", " + "))
 
 
 def detection(score: Score) -> Figure | None:

@@ -19,7 +19,7 @@ from sloshlab.identification.observations import observations
 from sloshlab.missing_physics import effects as vocabulary
 from sloshlab.missing_physics.candidate import Candidate, extension_of, known_effects
 from sloshlab.missing_physics.extension import Extension
-from sloshlab.missing_physics.units import named_and_units
+from sloshlab.missing_physics.units import in_words, named_and_units
 from sloshlab.user_twin import UserTwinModel
 
 assert vocabulary.__all__  # importing it makes the effects known
@@ -157,5 +157,5 @@ def _with_numbers(
         for known in candidate.effect.parameters:
             words, units = named_and_units(known.name)
             value = values[f"{candidate.key}.{known.name}"]
-            numbers.append(Number(f"{candidate.effect.name.replace('_', ' ')}: {words}", value, units))
+            numbers.append(Number(f"{in_words(candidate.effect.name)}: {words}", value, units))
     return FittedModel(model, dict(values), extension_of(candidates, values), tuple(numbers))

@@ -18,7 +18,7 @@ from sloshlab.diagnosis.inference.thresholds import NAMED
 from sloshlab.diagnosis.interval import Interval
 from sloshlab.identification.readiness import refuted_beliefs
 from sloshlab.missing_physics.candidate import Candidate, without_run
-from sloshlab.missing_physics.units import named_and_units
+from sloshlab.missing_physics.units import in_words, named_and_units
 
 _EQUIVALENT_FORCES: Final = {("asymmetric_friction",): ("constant_force", "coulomb_friction")}
 """Explanations that are the same force in the structure, whatever is recorded."""
@@ -47,9 +47,7 @@ def statement_of(found: Findings, decision: Decision, intervals: Mapping[tuple[s
         if decision.probabilities.get(NONE, 1.0) < NAMED:
             undecided = {label: p for label, p in decision.probabilities.items() if label != NONE and p >= _SAID}
             words = {UNKNOWN: "something that has no name"}
-            said = " or ".join(
-                f"{words.get(label, label.replace('_', ' '))} ({p:.2f})" for label, p in undecided.items()
-            )
+            said = " or ".join(f"{words.get(label, in_words(label))} ({p:.2f})" for label, p in undecided.items())
             text += f"; these recordings do not tell that from {said}"
         return text + "."
     if decision.kind == "unknown":
@@ -58,11 +56,11 @@ def statement_of(found: Findings, decision: Decision, intervals: Mapping[tuple[s
     named = " and ".join(_described(candidate, intervals) for candidate in decision.best.fit.candidates)
     text = f"Left out: {named}; {_remaining(found, decision.best)}"
     if decision.kind == "indistinguishable":
-        others = [" + ".join(names).replace("_", " ") for names in names_of_alternatives(decision)[1:]]
+        others = [in_words(" + ".join(names)) for names in names_of_alternatives(decision)[1:]]
         text += f"; cannot be told from {' or '.join(others)}"
     if decision.wider:
         besides = (Counter(model.names) - Counter(decision.best.names) for model in decision.wider)
-        more = dict.fromkeys(" + ".join(names.elements()).replace("_", " ") for names in besides)
+        more = dict.fromkeys(in_words(" + ".join(names.elements())) for names in besides)
         text += f"; these recordings do not tell whether {' or '.join(more)} is missing besides"
     return text + "."
 
@@ -96,7 +94,7 @@ def headline_of(
         missed = f"unseen runs are missed by {before:.2g} noise floors"
         return f"Something is missing{where} that has no name here; {missed}."
     named = " and ".join(_with_size(candidate, intervals) for candidate in decision.best.fit.candidates)
-    others = [" + ".join(names).replace("_", " ") for names in names_of_alternatives(decision)[1:]]
+    others = [in_words(" + ".join(names)) for names in names_of_alternatives(decision)[1:]]
     ways = [""]
     if decision.kind == "indistinguishable" and others:
         more = f" or {len(others) - 1} more" if len(others) > 1 else ""
@@ -232,7 +230,7 @@ def form_and_place(candidate: Candidate) -> str:
 
 
 def _placed(name: str, candidate: Candidate) -> str:
-    words = name.replace("_", " ")
+    words = in_words(name)
     place = candidate.channel.replace("+", " and ").replace("<", " from ")
     return f"{words} of {place}" if place else f"{words} in the {candidate.effect.block}"
 

@@ -1,4 +1,4 @@
-"""Words and units in the names of numbers."""
+"""Words and units in the names of effects and of their numbers."""
 
 from __future__ import annotations
 
@@ -25,6 +25,19 @@ _UNITS: Final = (
 )
 _OF_A_CHANNEL: Final = ("amplitude", "limit", "rate")
 """Numbers of sensor effects in the unit of their channel."""
+_PEOPLE: Final = frozenset({"coulomb", "faraday", "stribeck"})
+"""After whom effects are called."""
+
+
+def in_words(name: str) -> str:
+    """A name, or names joined, as a sentence has it.
+
+    Examples
+    --------
+    >>> in_words("coulomb_friction + sensor_delay")
+    'Coulomb friction + sensor delay'
+    """
+    return " ".join(word.capitalize() if word in _PEOPLE else word for word in name.replace("_", " ").split(" "))
 
 
 def is_calibrated(parameter: str) -> bool:
@@ -44,7 +57,7 @@ def named_and_units(parameter: str) -> tuple[str, str]:
     Examples
     --------
     >>> named_and_units("stribeck_velocity_m_per_s"), named_and_units("ratio")
-    (('stribeck velocity', 'm/s'), ('ratio', ''))
+    (('Stribeck velocity', 'm/s'), ('ratio', ''))
     >>> named_and_units("start_s in run_02")
     ('start in run_02', 's')
     """
@@ -52,5 +65,5 @@ def named_and_units(parameter: str) -> tuple[str, str]:
     # Longer endings come first in the list, as `_m` is the end of `_n_per_m`, too.
     for ending, units in _UNITS:
         if parameter.endswith(ending):
-            return parameter.removesuffix(ending).replace("_", " ") + of + run, units
-    return parameter.replace("_", " ") + of + run, ""
+            return in_words(parameter.removesuffix(ending)) + of + run, units
+    return in_words(parameter) + of + run, ""

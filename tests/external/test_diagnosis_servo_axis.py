@@ -124,4 +124,4 @@ def test_what_is_left_beside_friction_has_no_name_where_the_force_is_known_to_tw
     found = example.diagnosed(case, report=False)
     assert found["verdict"] == "unknown"
     assert "the nearest known effect is asymmetric friction in the structure" in found["statement"]
-    assert "constant force with coulomb friction" in found["statement"]
+    assert "constant force with Coulomb friction" in found["statement"]

@@ -69,7 +69,7 @@ def test_numbers_stand_beside_the_truth_and_one_outside_its_interval_is_said() -
 
 def test_the_truth_is_said_with_its_numbers_and_the_channel_of_a_sensor() -> None:
     said = truth_sentence({"effects": [FRICTION, LATE], "details": {}})
-    assert said == "coulomb friction (structure), force_n 0.31; sensor delay (acceleration_tip), delay_s 0.003"
+    assert said == "Coulomb friction (structure), force 0.31 N; sensor delay (acceleration_tip), delay 0.003 s"
     assert truth_sentence({"effects": [], "details": {"nuisance": "burst"}}) == "nothing, beside a burst of noise"
 
 
