@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Sequence
 from typing import Final
 
@@ -14,19 +15,27 @@ from sealed_trial.scoring.calibration import Calibration
 from sealed_trial.scoring.score import Gain, Score
 from sealed_trial.scoring.statistics import Rate
 
-CAPTIONS: Final = {
-    "classes": "Answers by class; right ones are framed.",
-    "names": "Answers by what was hidden.",
+TITLES: Final = {
+    "classes": "Answers by class",
+    "names": "Answers by what was hidden",
+    "detection": "What became of every hidden effect against its strength",
+    "reliability": "How often it is true over the probability stated",
+    "gains": "Error on held-out runs before and after",
+}
+DETAILS: Final = {
+    "classes": "; right ones are framed.",
+    "names": ".",
     "detection": (
-        "What became of every hidden effect against its strength; filled marks were answered right. "
+        "; filled marks were answered right. "
         "The line is a logistic curve, the dashed one three times the noise floor."
     ),
     "reliability": (
-        "How often it is true over the probability stated, in ten bins of as many forecasts each, "
-        "with Wilson's intervals; left the most probable label of every case, right every label."
+        ", in ten bins of as many forecasts each, with Wilson's intervals; "
+        "left the most probable label of every case, right every label."
     ),
-    "gains": "Error on held-out runs before and after, over that of the ceiling, as the verdicts state it.",
+    "gains": ", over that of the ceiling, as the verdicts state it.",
 }
+_LINE_WIDTH: Final = 120
 
 
 def page_text(score: Score, figures: Sequence[str], about: str = "") -> str:
@@ -39,12 +48,17 @@ def page_text(score: Score, figures: Sequence[str], about: str = "") -> str:
         _acceptance(score.acceptance),
         _rates(score),
         _numbers(score),
-        "\n\n".join(f"![{CAPTIONS[name]}](figures/{name}.png)\n\n{CAPTIONS[name]}" for name in figures),
+        "\n\n".join(map(_figure, figures)),
         _rivals(score),
         _gains(score.gains),
         _failures(score),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _figure(name: str) -> str:
+    caption = textwrap.fill(TITLES[name] + DETAILS[name], _LINE_WIDTH)
+    return f"![{TITLES[name]}](figures/{name}.png)\n\n{caption}"
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -83,7 +97,7 @@ def _acceptance(aims: Sequence[Aim]) -> str:
 
 
 def _fine(value: float) -> str:
-    return f"{100 * value:.1f} %"
+    return f"{100 * value:.1f}".removesuffix(".0") + " %"
 
 
 def _rates(score: Score) -> str:

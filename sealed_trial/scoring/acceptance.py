@@ -10,7 +10,7 @@ from typing import Final, Literal
 from sealed_trial.scoring.calibration import Calibration
 from sealed_trial.scoring.statistics import Rate, rate
 
-Standing = Literal["met", "not met", "cannot tell at this size"]
+Standing = Literal["met", "not met", "cannot tell"]
 
 FALSE_ALARMS: Final = "false alarms where nothing is missing"
 CLEAR_SINGLES: Final = "clear single effects named in the right block"
@@ -72,7 +72,7 @@ def acceptance(rates: Mapping[str, Rate], calibrations: Mapping[str, Calibration
 
 
 def _of_rate(name: str, its: Rate, least: float, most: float) -> Aim:
-    standing: Standing = "cannot tell at this size"
+    standing: Standing = "cannot tell"
     if its.n and least <= its.low and its.high <= most:
         standing = "met"
     elif its.n and (its.high < least or its.low > most):
@@ -83,7 +83,7 @@ def _of_rate(name: str, its: Rate, least: float, most: float) -> Aim:
 
 def _of_calibration(kind: str, its: Calibration) -> Aim:
     most = LARGEST_CALIBRATION_ERROR
-    standing: Standing = "cannot tell at this size"
+    standing: Standing = "cannot tell"
     # where cases are few the interval is too narrow: what chance makes of right probabilities must fit in, too,
     # and a share of errors none of which was seen; chance must not explain what is called an error
     if max(its.error, its.high, its.by_chance, rate(0, its.n_cases).high) <= most:

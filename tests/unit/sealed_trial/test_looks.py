@@ -13,8 +13,8 @@ from sealed_trial.scoring.acceptance import Aim
 from sloshlab.errors import InputError
 
 AIMS = (
-    Aim("wrong names anywhere", 0.0, 0.01, 0.025, 0.004, 0.13, 40, False, "cannot tell at this size"),
-    Aim("pairs with both names", 0.8, 1.0, float("nan"), 0.0, 1.0, 0, False, "cannot tell at this size"),
+    Aim("wrong names anywhere", 0.0, 0.01, 0.025, 0.004, 0.13, 40, False, "cannot tell"),
+    Aim("pairs with both names", 0.8, 1.0, float("nan"), 0.0, 1.0, 0, False, "cannot tell"),
 )
 AT = datetime(2026, 3, 2, 9, 30, tzinfo=UTC)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from pipelines.diagnosis.trial_figures import detection
-from pipelines.diagnosis.trial_page import page_text
+from pipelines.diagnosis.trial_page import TITLES, page_text
 from sealed_trial.running import Outcome
 from sealed_trial.scoring.answer import Answer
 from sealed_trial.scoring.score import Score, scored
@@ -35,3 +35,9 @@ def test_a_strength_that_nobody_stated_is_clear_and_on_no_axis() -> None:
     assert detection(found) is None
     assert "| a | one effect | coulomb_friction | – |" in page_text(found, [])
     assert found.to_document()["marks"][0]["strength"] is None
+
+
+def test_no_line_of_a_page_with_every_figure_is_longer_than_120_characters() -> None:
+    page = page_text(score(4.0), list(TITLES))
+    assert max(map(len, page.splitlines())) <= 120
+    assert page.count("(figures/") == len(TITLES)
