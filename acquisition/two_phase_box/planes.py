@@ -16,6 +16,9 @@ from acquisition.two_phase_tank.reconstruction import EMPTY, area_below, height_
 _ALONG = 1e-7
 """Component of a normal below which a plane is along that axis."""
 
+_NEWTON_STEP = 1e-8
+"""Length of the last step in the search for a plane: the square root of what a number resolves."""
+
 
 @njit(cache=True, error_model="numpy")
 def sorted_three(a, b, c):  # type: ignore[no-untyped-def]
@@ -73,8 +76,9 @@ def _searched(m1, m2, m3, v, low, high):  # type: ignore[no-untyped-def]
         else:
             low = alpha
         step = alpha - (volume - v) / slope
-        after = step if low < step < high else 0.5 * (low + high)
-        if abs(after - alpha) < 1e-15:
+        after = step if low <= step <= high else 0.5 * (low + high)
+        # the error of a step of Newton's is of the order of its square
+        if abs(after - alpha) < _NEWTON_STEP:
             return after
         alpha = after
     return alpha
