@@ -133,7 +133,11 @@ class ForwardGrowth:
             self.known.keep(self.fitted_to_the_end(some, bases[0], self.known.hopeless_cost()))
 
     def fitted_to_the_end(
-        self, coarse: Sequence[FreeRunFit], base: FreeRunFit, hopeless_cost: HopelessCost | None = None
+        self,
+        coarse: Sequence[FreeRunFit],
+        base: FreeRunFit,
+        hopeless_cost: HopelessCost | None = None,
+        stages: Sequence[float] = (),
     ) -> Iterator[FreeRunFit]:
         """Fits on all runs, beside a base, as the workers of the model make them.
 
@@ -142,10 +146,12 @@ class ForwardGrowth:
         coarse : sequence of FreeRunFit
         base : FreeRunFit
         hopeless_cost : callable, optional
+        stages : sequence of float, optional
+            Of noise inflation, in place of those in which residuals show.
         """
 
         def to_the_end(fit: FreeRunFit) -> FreeRunFit:
-            return replace(full_fit(self.known.runs, fit, base, hopeless_cost), candidates=())
+            return replace(full_fit(self.known.runs, fit, base, hopeless_cost, stages), candidates=())
 
         runs = self.known.runs
         fits = runs.effort.spent_on(runs.model.executor, to_the_end, coarse)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
 from sloshlab.identification.free_run_fit import fitted, stages_for
@@ -14,9 +14,12 @@ HopelessCost = Callable[[float], float]
 
 
 def at_its_optimum(
-    problem: FreeRunProblem, start: Mapping[str, float], hopeless_cost: HopelessCost | None = None
+    problem: FreeRunProblem,
+    start: Mapping[str, float],
+    hopeless_cost: HopelessCost | None = None,
+    stages: Sequence[float] = (),
 ) -> FreeRunFit:
-    """A fit through all stages of noise inflation in which the residuals of its start show.
+    """A fit through all stages of noise inflation in which the residuals of its start show, or through others.
 
     What stood in for an effect is off by as much when the effect is taken out, and the other way round.
 
@@ -25,14 +28,19 @@ def at_its_optimum(
     problem : FreeRunProblem
     start : mapping
     hopeless_cost : callable, optional
+    stages : sequence of float, optional
     """
     here = FreeRunFit(problem.candidates, dict(start), 0.0, 0.0)
-    stages = stages_for(problem, here)
+    stages = stages or stages_for(problem, here)
     return fitted(problem, start, n_iterations=15, stages=stages, hopeless_cost=hopeless_cost)[0]
 
 
 def full_fit(
-    runs: FittedRuns, coarse: FreeRunFit, base: FreeRunFit, hopeless_cost: HopelessCost | None = None
+    runs: FittedRuns,
+    coarse: FreeRunFit,
+    base: FreeRunFit,
+    hopeless_cost: HopelessCost | None = None,
+    stages: Sequence[float] = (),
 ) -> FreeRunFit:
     """A fit on all runs, from a coarse one beside a base.
 
@@ -42,9 +50,11 @@ def full_fit(
     coarse, base : FreeRunFit
         Numbers that the first lacks are those of the second.
     hopeless_cost : callable, optional
+    stages : sequence of float, optional
+        Of noise inflation, in place of those in which residuals show.
     """
     problem = runs.problem_of(coarse)
-    fit = at_its_optimum(problem, {**base.values, **coarse.values}, hopeless_cost)
+    fit = at_its_optimum(problem, {**base.values, **coarse.values}, hopeless_cost, stages)
     # What an effect has of its own in a run, such as an instant.
     own = {problem.owner(name) for name in problem.names[problem.n_baseline :]}
     alone = [run for run in runs.runs if run[0].run.is_free or run[0].run.name in own]

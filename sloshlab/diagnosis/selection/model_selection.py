@@ -21,6 +21,7 @@ from sloshlab.diagnosis.selection.full_fit import at_its_optimum
 from sloshlab.diagnosis.selection.hidden_effects import hidden_effects
 from sloshlab.diagnosis.selection.known_fits import N_KEPT, KnownFits
 from sloshlab.diagnosis.selection.nested_models import keys_of, own_numbers, reduced, without
+from sloshlab.identification.free_run_fit import INFLATION_STAGES
 from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.missing_force.latent_force import STRUCTURE, TANK
 from sloshlab.missing_physics.candidate import Candidate, Surroundings
@@ -245,7 +246,12 @@ class ModelSelection:
         is_more_probable = False
         # Those that promise most first; look-alikes of what keeps its promise after them.
         for some in (starts[:N_KEPT], starts[N_KEPT : 2 * N_KEPT]):
-            found = list(self.growth.fitted_to_the_end(some, fit))
+            # An effect that numbers of the baseline stand in for is far away in them. The noise of details is
+            # rough on the way there; of its beliefs alone, which weigh most where noise is inflated, it is not.
+            found = [
+                *self.growth.fitted_to_the_end(some, fit),
+                *self.growth.fitted_to_the_end(some, fit, stages=INFLATION_STAGES),
+            ]
             self.known.keep(found)
             # All others have been compared with these.
             self._swapped_beside.setdefault(keys_of(fit.candidates), set()).update(

@@ -9,9 +9,12 @@ from typing import Any, cast
 import pytest
 from recorded_oscillators import decays, effect, rig, surroundings
 
+from sloshlab.diagnosis.selection import model_selection
+from sloshlab.diagnosis.selection.hidden_effects import HiddenEffect
 from sloshlab.diagnosis.selection.model_selection import ModelSelection
 from sloshlab.diagnosis.selection.nested_models import reduced
 from sloshlab.diagnosis.selection.successive_halving import _best_starts
+from sloshlab.identification.free_run_fit import INFLATION_STAGES
 from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_physics import effects
@@ -90,3 +93,32 @@ def test_a_simpler_form_far_behind_begins_again_where_the_wider_one_ended(
     assert [each.values for each in begun] == [
         {"frequency of mode 1": 1.01, "structure.coulomb_friction.force_n": 5.5}
     ] * n_begun
+
+
+def test_a_hidden_effect_is_fitted_from_afar_as_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An offset stands in for a constant force: near the noise the fit stops where friction makes it rough."""
+    at = surroundings(RigModel(rig(tmp_path), tmp_path, decays()))
+    force = Candidate(effect("structure.constant_force"), at)
+    number = "structure.constant_force.force_n"
+    hidden = HiddenEffect(force, {number: -0.2}, gain=20.0)
+    monkeypatch.setattr(model_selection, "hidden_effects", lambda *arguments: [hidden])
+    kept: list[FreeRunFit] = []
+
+    def fitted_to_the_end(
+        coarse: list[FreeRunFit], base: FreeRunFit, hopeless_cost: object = None, stages: tuple[float, ...] = ()
+    ) -> list[FreeRunFit]:
+        reached, cost = (-1.5, 10.0) if stages == INFLATION_STAGES else (-0.4, 90.0)
+        return [FreeRunFit(each.candidates, {number: reached}, cost, cost) for each in coarse]
+
+    def is_more_probable(found: list[FreeRunFit], fit: FreeRunFit) -> bool:
+        return min((each.cost for each in found), default=fit.cost) < fit.cost
+
+    selection = cast(Any, object.__new__(ModelSelection))
+    selection.said = lambda what, done, of: None
+    selection.growth = SimpleNamespace(
+        pool=[force], pool_beside=lambda fits: [force], fitted_to_the_end=fitted_to_the_end
+    )
+    selection.known = SimpleNamespace(runs=None, keep=kept.extend, is_more_probable=is_more_probable)
+    selection._swapped_beside = {}
+    assert selection._uncovered(FreeRunFit((), {}, 50.0, 50.0))
+    assert sorted(each.values[number] for each in kept) == [-1.5, -0.4]
