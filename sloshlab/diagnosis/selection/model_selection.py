@@ -20,7 +20,7 @@ from sloshlab.diagnosis.selection.forward_growth import ForwardGrowth, Said
 from sloshlab.diagnosis.selection.full_fit import at_its_optimum
 from sloshlab.diagnosis.selection.hidden_effects import hidden_effects
 from sloshlab.diagnosis.selection.known_fits import N_KEPT, KnownFits
-from sloshlab.diagnosis.selection.nested_models import keys_of, own_numbers, reduced, without
+from sloshlab.diagnosis.selection.nested_models import keys_of, own_numbers, reduced, widened, without
 from sloshlab.identification.free_run_fit import INFLATION_STAGES
 from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.missing_force.latent_force import STRUCTURE, TANK
@@ -56,6 +56,7 @@ class ModelSelection:
         self.growth = ForwardGrowth(self.known, at, said)
         self._swapped_beside: dict[frozenset[str], set[frozenset[str]]] = {}
         self._simplified_at: dict[tuple[frozenset[str], str], Mapping[str, float]] = {}
+        self._widened_at: dict[frozenset[str], Mapping[str, float]] = {}
         self._reached = {1}
 
     def selected(self, retuned: FreeRunFit) -> list[FreeRunFit]:
@@ -98,7 +99,7 @@ class ModelSelection:
         """Number of effects up to which models are sought: one more where the best one leaves something."""
         n = 1
         while n < _MOST_EFFECTS:
-            best = self.known.best_of(n)
+            best = self._widest(n)
             if best is None or self.known.explains_little(n):
                 break
             if not self.known.remains(best) and not (self._renew_scatter(best) and self.known.remains(best)):
@@ -109,6 +110,28 @@ class ModelSelection:
                 self.known.renew_sampling()
             n += 1
         return n
+
+    def _widest(self, n: int) -> FreeRunFit | None:
+        """The best model of so many effects, where something remains also with what reduces to one of them.
+
+        Begun where it does: drawn from its prior a form with more numbers seldom comes as near.
+        """
+        best = self.known.best_of(n)
+        if best is None or not self.known.remains(best):
+            return best
+        keys = keys_of(best.candidates)
+        if self._widened_at.get(keys) is not best.values:
+            self._widened_at[keys] = best.values
+            begun = [
+                FreeRunFit((*rest.candidates, wider), {**rest.values, **numbers}, 0.0, 0.0)
+                for effect in best.candidates
+                for rest in [without(best, effect)]
+                for wider in self.growth.pool
+                if wider.reduces_to(effect)
+                for numbers in widened(best, effect, wider)
+            ]
+            self.known.keep(self.growth.fitted_to_the_end(begun, best))
+        return self.known.best_of(n)
 
     def _renew_scatter(self, best: FreeRunFit) -> bool:
         """Noise by the scatter of repeats about a fit; whether it is another now."""

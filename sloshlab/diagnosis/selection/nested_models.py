@@ -65,3 +65,31 @@ def reduced(fit: FreeRunFit, wider: Candidate, simpler: Candidate) -> dict[str, 
         mean = float(np.mean(alike)) if number in simpler.sizes and alike else start
         found[name] = own.get(f"{wider.key}.{number}", mean)
     return found
+
+
+def widened(fit: FreeRunFit, simpler: Candidate, wider: Candidate) -> list[dict[str, float]]:
+    """Numbers of what reduces to an effect of a fit, about where it does: the other way round than `reduced`.
+
+    Parameters
+    ----------
+    fit : FreeRunFit
+    simpler, wider : Candidate
+        The effect of the fit, and another of its place.
+
+    Returns
+    -------
+    list of dict
+        One for each different start of the numbers that the effect of the fit has none for.
+    """
+    own = {name.removeprefix(f"{simpler.key}."): value for name, value in own_numbers(fit, simpler).items()}
+    found: list[dict[str, float]] = []
+    for start in wider.starts():
+        begun = {}
+        for name, value in start.items():
+            number = name.removeprefix(f"{wider.key}.")
+            unit = named_and_units(number)[1]
+            alike = [own[size] for size in simpler.sizes if size in own and named_and_units(size)[1] == unit]
+            begun[name] = own.get(number, float(np.mean(alike)) if number in wider.sizes and alike else value)
+        if begun not in found:
+            found.append(begun)
+    return found

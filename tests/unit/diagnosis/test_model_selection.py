@@ -12,7 +12,7 @@ from recorded_oscillators import decays, effect, rig, surroundings
 from sloshlab.diagnosis.selection import model_selection
 from sloshlab.diagnosis.selection.hidden_effects import HiddenEffect
 from sloshlab.diagnosis.selection.model_selection import ModelSelection
-from sloshlab.diagnosis.selection.nested_models import reduced
+from sloshlab.diagnosis.selection.nested_models import reduced, widened
 from sloshlab.diagnosis.selection.successive_halving import _best_starts
 from sloshlab.identification.free_run_fit import INFLATION_STAGES
 from sloshlab.identification.free_run_problem import FreeRunFit
@@ -72,6 +72,60 @@ def test_a_simpler_form_is_fitted_from_the_numbers_of_the_wider_one(tmp_path: Pa
     fit = FreeRunFit((wider,), {"frequency of mode 1": 1.01, **own}, 0.0, 0.0)
     assert wider.reduces_to(simpler)
     assert reduced(fit, wider, simpler) == {"structure.coulomb_friction.force_n": 5.5}
+
+
+def test_a_wider_form_begins_at_the_numbers_of_the_simpler_one(tmp_path: Path) -> None:
+    at = surroundings(RigModel(rig(tmp_path), tmp_path, decays()))
+    play, by_direction = (
+        Candidate(effect(f"structure.{name}"), at)
+        for name in ("friction_behind_play", "friction_behind_play_by_direction")
+    )
+    own = {"force_n": 5.0, "play_m": 0.01, "stiffness_n_per_m": 30.0}
+    fit = FreeRunFit(
+        (play,), {"frequency of mode 1": 1.01} | {f"{play.key}.{n}": v for n, v in own.items()}, 0.0, 0.0
+    )
+    [begun] = widened(fit, play, by_direction)
+    expected = {"force_up_n": 5.0, "force_down_n": 5.0, "play_m": 0.01, "stiffness_n_per_m": 30.0}
+    assert begun == {f"{by_direction.key}.{name}": value for name, value in expected.items()}
+
+
+def test_numbers_that_a_simpler_form_has_not_begin_at_each_of_their_starts(tmp_path: Path) -> None:
+    at = surroundings(RigModel(rig(tmp_path), tmp_path, decays()))
+    coulomb, stribeck = (
+        Candidate(effect(f"structure.{name}"), at) for name in ("coulomb_friction", "stribeck_friction")
+    )
+    begun = widened(FreeRunFit((coulomb,), {f"{coulomb.key}.force_n": 5.0}, 0.0, 0.0), coulomb, stribeck)
+    speeds = {start[f"{stribeck.key}.stribeck_velocity_m_per_s"] for start in stribeck.starts()}
+    assert len(begun) == len(speeds) == 3
+    assert {each[f"{stribeck.key}.stribeck_velocity_m_per_s"] for each in begun} == speeds
+    assert all(each[f"{stribeck.key}.{size}"] == 5.0 for each in begun for size in ("coulomb_n", "static_n"))
+
+
+def test_what_leaves_something_is_widened_once(tmp_path: Path) -> None:
+    at = surroundings(RigModel(rig(tmp_path), tmp_path, decays()))
+    play, by_direction = (
+        Candidate(effect(f"structure.{name}"), at)
+        for name in ("friction_behind_play", "friction_behind_play_by_direction")
+    )
+    own = {f"{play.key}.force_n": 5.0, f"{play.key}.play_m": 0.01, f"{play.key}.stiffness_n_per_m": 30.0}
+    best = FreeRunFit((play,), {"frequency of mode 1": 1.01, **own}, 100.0, 100.0)
+    runs = SimpleNamespace(model=None, tests=(), effort=None)
+    selection = cast(Any, ModelSelection(cast(Any, runs), at, lambda what, done, of: None))
+    selection.known.keep([best])
+    selection.known.remains = lambda fit: True
+    fitted: list[FreeRunFit] = []
+
+    def fitted_to_the_end(begun: list[FreeRunFit], base: FreeRunFit) -> list[FreeRunFit]:
+        fitted.extend(begun)
+        return [FreeRunFit(each.candidates, each.values, 110.0, 110.0) for each in begun]
+
+    selection.growth = SimpleNamespace(pool=[play, by_direction], fitted_to_the_end=fitted_to_the_end)
+    assert selection._widest(1) is best
+    assert selection._widest(1) is best
+    [begun] = fitted
+    assert begun.candidates == (by_direction,)
+    assert begun.values["frequency of mode 1"] == 1.01
+    assert not set(begun.values) & set(own)
 
 
 @pytest.mark.parametrize(("known_cost", "n_begun"), [(None, 1), (5e4, 1), (110.0, 0)])
