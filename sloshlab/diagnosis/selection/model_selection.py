@@ -99,7 +99,7 @@ class ModelSelection:
         """Number of effects up to which models are sought: one more where the best one leaves something."""
         n = 1
         while n < _MOST_EFFECTS:
-            best = self._widest(n)
+            best = self._best_with_wider_forms(n)
             if best is None or self.known.explains_little(n):
                 break
             if not self.known.remains(best) and not (self._renew_scatter(best) and self.known.remains(best)):
@@ -111,10 +111,10 @@ class ModelSelection:
             n += 1
         return n
 
-    def _widest(self, n: int) -> FreeRunFit | None:
-        """The best model of so many effects, where something remains also with what reduces to one of them.
+    def _best_with_wider_forms(self, n: int) -> FreeRunFit | None:
+        """The best model of so many effects; where it leaves something, also of those with wider forms of them.
 
-        Begun where it does: drawn from its prior a form with more numbers seldom comes as near.
+        A form with more numbers begins where the simpler one ended.
         """
         best = self.known.best_of(n)
         if best is None or not self.known.remains(best):
@@ -269,8 +269,8 @@ class ModelSelection:
         is_more_probable = False
         # Those that promise most first; look-alikes of what keeps its promise after them.
         for some in (starts[:N_KEPT], starts[N_KEPT : 2 * N_KEPT]):
-            # An effect that numbers of the baseline stand in for is far away in them. The noise of details is
-            # rough on the way there; of its beliefs alone, which weigh most where noise is inflated, it is not.
+            # What stands in for an effect may have to move far, and fits that begin near the noise have stopped on
+            # the way there; those that begin with inflated noise have lost a mode that the others found.
             found = [
                 *self.growth.fitted_to_the_end(some, fit),
                 *self.growth.fitted_to_the_end(some, fit, stages=INFLATION_STAGES),

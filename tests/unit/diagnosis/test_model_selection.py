@@ -120,8 +120,8 @@ def test_what_leaves_something_is_widened_once(tmp_path: Path) -> None:
         return [FreeRunFit(each.candidates, each.values, 110.0, 110.0) for each in begun]
 
     selection.growth = SimpleNamespace(pool=[play, by_direction], fitted_to_the_end=fitted_to_the_end)
-    assert selection._widest(1) is best
-    assert selection._widest(1) is best
+    assert selection._best_with_wider_forms(1) is best
+    assert selection._best_with_wider_forms(1) is best
     [begun] = fitted
     assert begun.candidates == (by_direction,)
     assert begun.values["frequency of mode 1"] == 1.01
@@ -150,7 +150,7 @@ def test_a_simpler_form_far_behind_begins_again_where_the_wider_one_ended(
 
 
 def test_a_hidden_effect_is_fitted_from_afar_as_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An offset stands in for a constant force: near the noise the fit stops where friction makes it rough."""
+    """An offset stands in for a constant force: near the noise the fit stops on the way to it."""
     at = surroundings(RigModel(rig(tmp_path), tmp_path, decays()))
     force = Candidate(effect("structure.constant_force"), at)
     number = "structure.constant_force.force_n"

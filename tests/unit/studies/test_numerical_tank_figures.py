@@ -161,10 +161,14 @@ def test_plates_are_repeatable_pictures_without_empty_panels(rig: Rig, cycle: li
 
 def test_the_released_beam_throws_its_liquid_at_first_and_sways_it_later(rig: Rig) -> None:
     """By particles above three quarters of the height, and by the decay of Table 2.4 as a bound from above."""
-    first, later = released(rig, layers_per_height=10, seed=0)
-    high = [(instant.snapshot.liquid.z_m > 0.75 * HEIGHT_M).mean() for instant in (first, later)]
-    assert high[0] > 0.15
-    assert high[1] < 0.05
+    # the flow is chaotic: single starts scatter by 0.04, and one start ends elsewhere on another processor
+    starts = [released(rig, layers_per_height=10, seed=seed) for seed in range(6)]
+    first, later = starts[0]
+    high = np.array(
+        [[(instant.snapshot.liquid.z_m > 0.75 * HEIGHT_M).mean() for instant in instants] for instants in starts]
+    )
+    assert high[:, 0].mean() > 0.15
+    assert high[:, 1].mean() < 0.05
     assert later.time_s == pytest.approx(1.2, abs=2e-3)
     # at the release the tank has 6.9 g, with frozen liquid e^(−ζωt) = 0.77 of it at that time
     assert abs(later.acceleration_g) < 0.3 * 6.9
