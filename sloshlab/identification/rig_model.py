@@ -30,6 +30,7 @@ from sloshlab.identification.rig_parameters import (
     retuned_term,
     rig_parameters,
 )
+from sloshlab.identification.sampled_reversals import averaged_where_friction_turns
 from sloshlab.missing_physics.candidate import BLOCKS_OF_A_RIG, Candidate, extension_of
 from sloshlab.missing_physics.extension import NOTHING, ActingDrive, Extension, SensorFault, with_acting
 from sloshlab.missing_physics.saved_effects import effect_lines
@@ -348,7 +349,7 @@ class RigModel:
             found = channel_weights(motion.twin, name, known.attributes[name], self.rig, n_cells=known.n_cells)
             if found is not None:
                 weights[name] = found
-        return _Truth(rows_of(motion), weights)
+        return _Truth(averaged_where_friction_turns(rows_of(motion), motion), weights)
 
     def _keep(self, key: tuple[Any, ...], truth: _Truth) -> None:
         with self._lock:

@@ -56,6 +56,18 @@ class Motion:
         relative = np.stack([self._relative(order) for order in range(3)], axis=-1)
         return np.stack([relative, relative + self.base_motion], axis=1)
 
+    def place(self, index: int, order: int) -> FloatArray:
+        """Displacement, velocity or acceleration of structure (0, relative) or tank (1, absolute), shape (n,).
+
+        Parameters
+        ----------
+        index : int
+            In `sloshlab.twin.terms.PLACES`.
+        order : int
+            Of the derivative by time.
+        """
+        return self._relative(order) + index * self.base_motion[:, order]
+
     def _relative(self, order: int) -> FloatArray:
         """Displacement, velocity or acceleration of the tank relative to the base."""
         if self.twin.structure is None:
