@@ -285,6 +285,17 @@ class KnownFits:
             problem = self.runs.problem_of(fit)
             misfit = problem.misfit(problem.residual(problem.theta_of(fit.values)))
             self._fits[keys] = replace(fit, misfit=misfit, cost=misfit + fit.cost - fit.misfit)
+        self._refit_leading()
+
+    def _refit_leading(self) -> None:
+        """The leading fits at their optima in the noise as it is now, from where they are."""
+        runs, leading = self.runs, self.leading(len(self.best.candidates))
+
+        def refitted(fit: FreeRunFit) -> FreeRunFit:
+            return replace(at_its_optimum(runs.problem_of(fit), fit.values, stages=(0.0,)), candidates=())
+
+        fits = runs.effort.spent_on(runs.model.executor, refitted, leading)
+        self.keep(replace(fit, candidates=old.candidates) for old, fit in zip(leading, fits, strict=True))
 
 
 def largest_evidence(fits: Sequence[FreeRunFit]) -> float:

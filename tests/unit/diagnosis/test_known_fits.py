@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import pytest
 from recorded_oscillators import decays, rig
 
+from sloshlab.diagnosis.selection import known_fits
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
 from sloshlab.diagnosis.selection.known_fits import KnownFits
 from sloshlab.identification.free_run_problem import FreeRunFit
@@ -71,3 +73,21 @@ def test_of_every_model_the_fit_of_the_lowest_cost_is_kept(tmp_path: Path) -> No
     assert known.of_length(0) == known.in_order() == [known.best]
     assert known.best_of(1) is None
     assert known.failed == {"": "does not run"}
+
+
+def test_the_leading_fits_are_at_their_optima_in_the_noise_that_is_known_by_then(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What was fitted in less noise stops where that ended it: recordings and twin agree at a ratio of one."""
+    known = KnownFits(runs_of(tmp_path))
+    off = FreeRunFit((), {**known.runs.model.believed, "frequency of mode 1": 1.004}, 1e9, 1e9)
+    known.keep([off])
+    known.renew_sampling()
+    assert known.best.values == off.values
+    noisier = [[replace(each, variance=4.0 * each.variance) for each in run] for run in known.runs.runs]
+    monkeypatch.setattr(known_fits, "with_sampled_jumps", lambda *arguments: noisier)
+    known.renew_sampling()
+    assert known.best.values["frequency of mode 1"] == pytest.approx(1.0, abs=2e-4)
+    problem = known.runs.problem_of(known.best)
+    residual = problem.residual(problem.theta_of(known.best.values))
+    assert known.best.misfit == pytest.approx(problem.misfit(residual), rel=1e-9)
