@@ -21,7 +21,8 @@ from sloshlab.diagnosis.selection.full_fit import at_its_optimum
 from sloshlab.diagnosis.selection.hidden_effects import hidden_effects
 from sloshlab.diagnosis.selection.known_fits import N_KEPT, KnownFits
 from sloshlab.diagnosis.selection.nested_models import keys_of, own_numbers, reduced, widened, without
-from sloshlab.identification.free_run_fit import INFLATION_STAGES
+from sloshlab.diagnosis.selection.successive_halving import STEPS_OF_A_RUNG
+from sloshlab.identification.free_run_fit import INFLATION_STAGES, fitted
 from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.missing_force.latent_force import STRUCTURE, TANK
 from sloshlab.missing_physics.candidate import Candidate, Surroundings
@@ -112,26 +113,39 @@ class ModelSelection:
         return n
 
     def _best_with_wider_forms(self, n: int) -> FreeRunFit | None:
-        """The best model of so many effects; where it leaves something, also of those with wider forms of them.
+        """The best model of so many effects, also of those with wider forms of them.
 
-        A form with more numbers begins where the simpler one ended.
+        A form with more numbers begins where the simpler one ended. Where that leaves something all of them are
+        fitted to the end, else those alone that leave less after a few steps.
         """
         best = self.known.best_of(n)
-        if best is None or not self.known.remains(best):
+        if best is None or self._widened_at.get(keys_of(best.candidates)) is best.values:
             return best
-        keys = keys_of(best.candidates)
-        if self._widened_at.get(keys) is not best.values:
-            self._widened_at[keys] = best.values
-            begun = [
-                FreeRunFit((*rest.candidates, wider), {**rest.values, **numbers}, 0.0, 0.0)
-                for effect in best.candidates
-                for rest in [without(best, effect)]
-                for wider in self.growth.pool
-                if wider.reduces_to(effect)
-                for numbers in widened(best, effect, wider)
-            ]
-            self.known.keep(self.growth.fitted_to_the_end(begun, best))
+        self._widened_at[keys_of(best.candidates)] = best.values
+        begun = [
+            FreeRunFit((*rest.candidates, wider), {**rest.values, **numbers}, 0.0, 0.0)
+            for effect in best.candidates
+            for rest in [without(best, effect)]
+            for wider in self.growth.pool
+            if wider.reduces_to(effect)
+            for numbers in widened(best, effect, wider)
+        ]
+        if begun and not self.known.remains(best):
+            begun = [fit for fit in self._few_steps_on(begun) if fit.cost < best.cost]
+        self.known.keep(self.growth.fitted_to_the_end(begun, best))
         return self.known.best_of(n)
+
+    def _few_steps_on(self, begun: list[FreeRunFit]) -> list[FreeRunFit]:
+        """Fits after as many steps as those of a rung of the halving."""
+        runs = self.known.runs
+
+        def continued(start: FreeRunFit) -> FreeRunFit:
+            problem = runs.problem_of(start)
+            fit, _ = fitted(problem, start.values, n_iterations=STEPS_OF_A_RUNG, stages=(0.0,), is_last=False)
+            return replace(fit, candidates=())
+
+        fits = runs.effort.spent_on(runs.model.executor, continued, begun)
+        return [replace(fit, candidates=start.candidates) for start, fit in zip(begun, fits, strict=True)]
 
     def _renew_scatter(self, best: FreeRunFit) -> bool:
         """Noise by the scatter of repeats about a fit; whether it is another now."""

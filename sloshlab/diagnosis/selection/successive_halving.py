@@ -17,7 +17,7 @@ from sloshlab.diagnosis.selection.proposals import Proposal, jacobian_beside
 from sloshlab.identification.free_run_fit import fitted, inflated_cost
 from sloshlab.identification.free_run_problem import TEMPERING, FreeRunFit
 
-_STEPS_OF_A_RUNG: Final = 3
+STEPS_OF_A_RUNG: Final = 3
 """Of a fit before it is compared with the others."""
 N_ALIKE: Final = 2
 """Starts of a model, and models of a name, that go on beside each other.
@@ -99,7 +99,7 @@ def _continued(runs: FittedRuns, running: _Running, inflation: float) -> tuple[F
     problem = runs.problem(running.proposal.candidates)
     known = jacobian_beside(problem, problem.theta_of(running.values), running.proposal.jacobian)
     fit, _ = fitted(
-        problem, running.values, n_iterations=_STEPS_OF_A_RUNG, stages=(inflation,), known=known, is_last=False
+        problem, running.values, n_iterations=STEPS_OF_A_RUNG, stages=(inflation,), known=known, is_last=False
     )
     cost = np.inf if fit.trouble else inflated_cost(problem, fit, inflation)
     return fit, cost

@@ -6,16 +6,19 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
+import numpy as np
 import pytest
-from recorded_oscillators import decays, effect, rig, surroundings
+from recorded_oscillators import decays, effect, fitted_from, rig, surroundings
 
 from sloshlab.diagnosis.selection import model_selection
+from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
 from sloshlab.diagnosis.selection.hidden_effects import HiddenEffect
 from sloshlab.diagnosis.selection.model_selection import ModelSelection
 from sloshlab.diagnosis.selection.nested_models import reduced, widened
 from sloshlab.diagnosis.selection.successive_halving import _best_starts
 from sloshlab.identification.free_run_fit import INFLATION_STAGES
 from sloshlab.identification.free_run_problem import FreeRunFit
+from sloshlab.identification.observations import observations
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_physics import effects
 from sloshlab.missing_physics.candidate import Candidate
@@ -126,6 +129,36 @@ def test_what_leaves_something_is_widened_once(tmp_path: Path) -> None:
     assert begun.candidates == (by_direction,)
     assert begun.values["frequency of mode 1"] == 1.01
     assert not set(begun.values) & set(own)
+
+
+def test_friction_that_falls_with_speed_is_found_from_dry_friction_that_leaves_nothing(tmp_path: Path) -> None:
+    """Drawn from their priors the numbers of Stribeck friction end where they are those of dry friction.
+
+    Decays by scipy: a friction of 0.9 N at rest and 0.5 N at speed, with a Stribeck velocity of 0.3 m/s.
+    """
+
+    def less_at_speed(t: float, x: float, v: float) -> float:
+        return float(0.4 * (1.0 - np.exp(-((v / 0.3) ** 2))) * np.sign(v))
+
+    model = RigModel(rig(tmp_path), tmp_path, decays((0.01, 0.03), friction_n=(0.9, 0.9), force=less_at_speed))
+    runs = FittedRuns(model, [observations(run, model.compared(run)) for run in model.runs], [])
+    selection = ModelSelection(runs, surroundings(model), lambda what, done, of: None)
+    friction = Candidate(effect("structure.coulomb_friction"), selection.growth.at)
+    problem = runs.problem([friction])
+    start = {**model.believed, "structure.coulomb_friction.force_n": 0.7}
+    dry = fitted_from(problem, [{name: start[name] for name in problem.names}])
+    selection.known.keep([dry])
+    monkeypatched = cast(Any, selection.known)
+    monkeypatched.remains = lambda fit: False
+    best = selection._best_with_wider_forms(1)
+    assert best is not None
+    [found] = best.candidates
+    assert found.effect.name == "stribeck_friction"
+    assert best.cost < 0.7 * dry.cost
+    numbers = {name.rpartition(".")[2]: best.values[name] for name in found.names}
+    assert numbers["static_n"] == pytest.approx(0.9, rel=0.1)
+    assert numbers["coulomb_n"] == pytest.approx(0.5, rel=0.15)
+    assert numbers["stribeck_velocity_m_per_s"] == pytest.approx(0.3, rel=0.2)
 
 
 @pytest.mark.parametrize(("known_cost", "n_begun"), [(None, 1), (5e4, 1), (110.0, 0)])
