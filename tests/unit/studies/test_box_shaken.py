@@ -1,14 +1,15 @@
-"""The box on the shaker: a run that was stopped gives what it would have given."""
+"""The box on the shaker: a run that was stopped gives what it would have given, and the map of its runs."""
 
 import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from acquisition.two_phase_box import checkpoint
-from studies.two_phase_verification import box_shaken
+from studies.two_phase_verification import box_map, box_shaken
 from studies.two_phase_verification.shaken import Shaking
 
 CASE = Shaking(3.0, 11.4, 4, 6)
@@ -50,3 +51,14 @@ def test_kept_results_account_for_all_energy_and_liquid() -> None:
         assert abs(found["volume_change"]) < 1e-5
         # the same work by the force and by the account
         assert abs(found["account_w_bar"] - found["w_bar"]) < 0.05
+
+
+def test_a_map_has_its_levels_over_the_stroke() -> None:
+    """ū = a₀/(Ω² h); a level of two points is no row."""
+    cases = [Shaking(2.0, frequency, 24, 12) for frequency in (11.0, 8.0, 18.0)]
+    cases += [Shaking(1.0, frequency, 24, 12) for frequency in (8.0, 11.0)]
+    results = {case.name: {"w_bar": case.frequency_hz} for case in cases}
+    found = box_map.rows(results, [*cases, Shaking(3.0, 8.0, 24, 12)])
+    assert list(found) == [2.0]
+    strokes = [2.0 * 9.80665 / (2 * np.pi * frequency) ** 2 / 0.0272 for frequency in (18.0, 11.0, 8.0)]
+    np.testing.assert_allclose(found[2.0], np.column_stack([strokes, [18.0, 11.0, 8.0]]), rtol=1e-3)
