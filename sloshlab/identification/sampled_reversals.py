@@ -1,8 +1,9 @@
-"""Samples about the instants at which dry friction turns: each the mean of its interval, as recorders make it.
+"""Samples about the instants at which dry friction turns: each the mean of its interval.
 
 Dry friction makes an acceleration jump where a velocity turns. Taken at instants, a sample beside the jump is the
 one or the other side of it, and a likelihood jumps with every parameter that moves the instant past a sample: no
-slope leads a fit from there. No recorder samples so; its filter averages over about an interval.
+slope leads a fit from there. The filter before a converter averages over about an interval, too; a recorder
+without one reads up to half a jump beside that, which belongs to the noise.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ def averaged_where_friction_turns(rows: Sequence[FloatArray], motion: Motion) ->
     """
     averaged = list(rows)
     n_modes = motion.modes.shape[2]
+    # q̈ of all modes, and the force of the terms on the tank
     jumping = [*range(2 * n_modes, 3 * n_modes), 3 * n_modes + 3]
     for place in sorted({PLACES.index(term.place) for term in motion.twin.terms if term.kind.dry_friction}):
         velocity, acceleration = motion.place(place, 1), motion.place(place, 2)

@@ -153,6 +153,7 @@ class ModelSelection:
             return False
         # What looked alike in the noise of before may not do so now.
         self._swapped_beside.clear()
+        self._widened_at.clear()
         return True
 
     def _extended(self, n: int) -> None:

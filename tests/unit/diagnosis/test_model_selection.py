@@ -131,7 +131,9 @@ def test_what_leaves_something_is_widened_once(tmp_path: Path) -> None:
     assert not set(begun.values) & set(own)
 
 
-def test_friction_that_falls_with_speed_is_found_from_dry_friction_that_leaves_nothing(tmp_path: Path) -> None:
+def test_friction_that_falls_with_speed_is_found_from_dry_friction_that_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Drawn from their priors the numbers of Stribeck friction end where they are those of dry friction.
 
     Decays by scipy: a friction of 0.9 N at rest and 0.5 N at speed, with a Stribeck velocity of 0.3 m/s.
@@ -148,8 +150,7 @@ def test_friction_that_falls_with_speed_is_found_from_dry_friction_that_leaves_n
     start = {**model.believed, "structure.coulomb_friction.force_n": 0.7}
     dry = fitted_from(problem, [{name: start[name] for name in problem.names}])
     selection.known.keep([dry])
-    monkeypatched = cast(Any, selection.known)
-    monkeypatched.remains = lambda fit: False
+    monkeypatch.setattr(selection.known, "remains", lambda fit: False)
     best = selection._best_with_wider_forms(1)
     assert best is not None
     [found] = best.candidates

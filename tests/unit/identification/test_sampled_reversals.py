@@ -22,8 +22,6 @@ JUMP_M_PER_S2 = 2 * OMEGA**2 * HELD_M
 RATE_HZ = 797.0
 N_HALF_CYCLES = 6
 """Until |START − 2 n HELD| < HELD."""
-
-
 FRICTION = COULOMB_FRICTION(force_n=MASS_KG * OMEGA**2 * HELD_M)
 
 
@@ -65,9 +63,11 @@ def test_samples_beside_reversals_and_the_stop_are_means_of_their_intervals() ->
 
 
 @pytest.mark.parametrize(
-    ("base", "n_left"), [(free(1.0, RATE_HZ), 0), (harmonic(8e-4, 31.0, 1.0, RATE_HZ), 2)], ids=["free", "shaken"]
+    ("base", "share", "n_left"),
+    [(free(1.0, RATE_HZ), 0.05, 0), (harmonic(8e-4, 31.0, 1.0, RATE_HZ), 0.2, 2)],
+    ids=["free", "shaken"],
 )
-def test_readings_follow_parameters_without_jumps(base: Excitation, n_left: int) -> None:
+def test_readings_follow_parameters_without_jumps(base: Excitation, share: float, n_left: int) -> None:
     """Reversals move past samples as the stiffness changes; a base makes the force steep where they are.
 
     A place that turns back within a sample jumps on both sides of it.
@@ -80,14 +80,14 @@ def test_readings_follow_parameters_without_jumps(base: Excitation, n_left: int)
     motions = [motion(MASS_KG * OMEGA**2 * ratio) for ratio in np.linspace(1.0, 1.02, 400)]
     moved = np.abs(np.diff([acceleration_row(motion) for motion in motions], axis=0))
     at_instants = np.abs(np.diff([motion.modes[:, 2, 0] for motion in motions], axis=0))
-    assert np.count_nonzero(at_instants > 0.2 * JUMP_M_PER_S2) >= 10
-    assert np.count_nonzero(moved > 0.2 * JUMP_M_PER_S2) <= n_left
+    assert np.count_nonzero(at_instants > share * JUMP_M_PER_S2) >= 10
+    assert np.count_nonzero(moved > share * JUMP_M_PER_S2) <= n_left
 
 
 def test_a_force_on_the_tank_jumps_in_its_own_row() -> None:
     """On a shaker the friction of a tank turns with the prescribed velocity."""
     twin = Twin(None, (COULOMB_FRICTION(place="tank", force_n=3.0),), carried_mass_kg=1.0)
-    motion = twin.simulate(harmonic(9.81, 5.0, 1.0, 200.0))
+    motion = twin.simulate(harmonic(0.01, 5.0, 1.0, 200.0))
     averaged = averaged_where_friction_turns(rows_of(motion), motion)[3]
     turning = np.flatnonzero(averaged != motion.tank_force_n)
     assert turning.size > 0
