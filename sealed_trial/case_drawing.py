@@ -23,12 +23,14 @@ from sealed_trial.laboratory.recorder import drawn_recorder
 from sealed_trial.laboratory.sensors import Sensor, drawn_sensor
 from sealed_trial.laboratory.test_plan import PLANS, TestPlan, drawn_plan
 from sealed_trial.look_alikes import possible_look_alikes
-from sealed_trial.strength import ONLY_DAMPING, QUICK, NoiseFloor, magnitude_for
+from sealed_trial.strength import LEAST_STRENGTH, ONLY_DAMPING, QUICK, STRENGTH_TOLERANCE, NoiseFloor, magnitude_for
 
 WEAKEST_CLEAR, STRONGEST_CLEAR = 3.5, 30.0
 WEAKEST_MASKED, STRONGEST_MASKED = 0.3, 3.0
 _HIDDEN_DRAWS = 8
 _LEFT_OPEN = 1.2
+_MOST_SEARCHES = 3
+"""For the magnitude of an effect, each with baselines about the one that was found before."""
 _LEAST_MOTION = 0.2
 """Of the motion without anything hidden; what is stuck is stuck by any friction, damper or spring alike."""
 
@@ -315,7 +317,14 @@ def _scaled(
         changed = change.distorted(changed, rate, late=True)
         return floor.strength(changed, damping_is_known=effect.name in ONLY_DAMPING)
 
-    magnitude, reached = magnitude_for(strength_of, wanted, effect.least, effect.most)
+    magnitude, reached = 1.0, math.nan
+    for _ in range(_MOST_SEARCHES):
+        magnitude, seemed = magnitude_for(strength_of, wanted, effect.least, effect.most, first=magnitude)
+        # Baselines are few, and the search has spent them on the magnitudes that it came by.
+        floor.start_anew()
+        reached = strength_of(magnitude)
+        if abs(math.log(max(reached, LEAST_STRENGTH) / max(seemed, LEAST_STRENGTH))) < STRENGTH_TOLERANCE:
+            break
     if effect.essential is not None and strength_of_change(effect.essential(magnitude)) < WEAKEST_CLEAR:
         raise LookupError(f"{effect.name} does not show what makes it")
     return effect.change(magnitude), reached

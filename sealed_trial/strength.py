@@ -43,6 +43,10 @@ _RELINEARISED_AT_ONCE, _SCANNED = 3, 13
 _MOST_BASELINES: Final = {"sdof": 7, "beam": 5, "shaker": 4}
 """Of an effect; a beam's are costly."""
 _HIDDEN, _WORTHWHILE = 0.25, 0.9
+STRENGTH_TOLERANCE: Final = 0.08
+"""Of the logarithm of a strength."""
+LEAST_STRENGTH: Final = 1e-9
+"""So that every strength has a logarithm."""
 QUICK = 1e-8
 """Tolerance of the integrator where only the size of an effect matters."""
 
@@ -268,18 +272,18 @@ def _motions_of_modes(rig: HiddenRig, signals: Sequence[Signals]) -> list[list[F
 
 
 def magnitude_for(
-    strength_of: Callable[[float], float], wanted: float, least: float, most: float, *, tolerance: float = 0.08
+    strength_of: Callable[[float], float], wanted: float, least: float, most: float, *, first: float = 1.0
 ) -> tuple[float, float]:
     """Magnitude with a wanted strength and the strength reached, by secants on logarithmic axes.
 
     Where the bounds of the magnitude do not reach it, the nearer bound.
     """
     known: list[tuple[float, float]] = []
-    magnitude = float(np.clip(1.0, least, most))
+    magnitude = float(np.clip(first, least, most))
     for _ in range(9):
-        reached = max(strength_of(magnitude), 1e-9)
+        reached = max(strength_of(magnitude), LEAST_STRENGTH)
         known.append((magnitude, reached))
-        if abs(np.log(reached / wanted)) < tolerance:
+        if abs(np.log(reached / wanted)) < STRENGTH_TOLERANCE:
             break
         below = max((k for k in known if k[1] < wanted), default=None)
         above = min((k for k in known if k[1] >= wanted), default=None)

@@ -189,6 +189,34 @@ def test_an_effect_whose_essential_part_is_hidden_is_not_drawn() -> None:
         _scaled(effect(0.3), 10.0, laboratory, floor, [])  # type: ignore[arg-type]
 
 
+class FloorWithFewBaselines:
+    """Tells a strength, as large as its size, about three baselines: beyond a factor of two of all it seems more."""
+
+    def __init__(self) -> None:
+        self.start_anew()
+
+    def start_anew(self) -> None:
+        self._near: list[float] = []
+
+    def strength(self, changed: list[Change], *, damping_is_known: bool) -> float:
+        assert not damping_is_known
+        size = changed[0].parameters["size"]
+        if len(self._near) < 3:
+            self._near.append(size)
+        return size if min(abs(np.log(size / near)) for near in self._near) < np.log(2.0) else 20.0 * size
+
+
+@pytest.mark.parametrize("wanted", [5.0, 20.0, 3000.0])
+def test_a_strength_is_that_about_baselines_near_the_magnitude(wanted: float) -> None:
+    laboratory = SimpleNamespace(
+        plan=SimpleNamespace(sampling_rate_hz=100.0), signals=lambda changes, relative_tolerance: changes
+    )
+    effect = DrawnEffect("base_rocking", "excitation", lambda m: Change({"size": 1e4 * m}), least=1e-8, most=1e8)
+    change, reached = _scaled(effect, wanted, laboratory, FloorWithFewBaselines(), [])  # type: ignore[arg-type]
+    assert change.parameters["size"] == pytest.approx(reached, rel=1e-12)
+    assert reached == pytest.approx(wanted, rel=0.09)
+
+
 @pytest.mark.slow
 def test_a_loss_is_the_equal_of_a_dashpot_only_where_it_predicts_the_same() -> None:
     """Free damping is a dashpot, which hides all of another one, but not relaxing springs, which creep."""
