@@ -202,8 +202,14 @@ def _high_passed(numbers: Numbers) -> Reading:
 def _high_pass_undone(numbers: Numbers) -> Reading:
     def reading(values: FloatArray, rate: float, others: Others, recorded: FloatArray) -> FloatArray:
         del others, recorded
-        # Less its mean, whose integral would be a ramp.
-        return np.asarray(values + np.nancumsum(values - np.nanmean(values)) / (numbers["time_constant_s"] * rate))
+        # By trapezoids: the inverse of the bilinear transform.
+        whole = values + (np.nancumsum(values) - 0.5 * values) / (numbers["time_constant_s"] * rate)
+        # The zero of a recorder becomes a ramp. The mean is no zero: where an acceleration ends elsewhere than it
+        # began, all of the difference has leaked away.
+        known = np.isfinite(whole)
+        time = np.arange(whole.size) - np.arange(whole.size)[known].mean()
+        slope = time[known] @ whole[known] / max(float(time[known] @ time[known]), 1.0)
+        return np.asarray(whole - slope * time)
 
     return reading
 

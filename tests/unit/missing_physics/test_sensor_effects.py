@@ -98,6 +98,31 @@ def test_a_sensor_that_was_charged_before_the_run_is_no_misfit(model: RigModel, 
     np.testing.assert_allclose(read(sensor_fault, SIGNAL, recorded), recorded, atol=4e-3 * AMPLITUDE)
 
 
+@pytest.mark.parametrize("n", [3930, 3970])
+def test_a_discharge_is_undone_but_for_a_constant_wherever_a_run_ends(model: RigModel, n: int) -> None:
+    """What has leaked away by then is no zero of the recorder: taken for one it left a ramp of a whole amplitude."""
+    tau, signal = 0.2, SIGNAL[:n]
+    sensor_fault = fault(model, "sensor_high_pass", {"time_constant_s": tau})
+    factor = 1j * OMEGA * tau / (1 + 1j * OMEGA * tau)
+    steady = AMPLITUDE * np.real(factor * np.exp(1j * (OMEGA * T[:n] + PHASE)))
+    recorded = steady + 2.0 * np.exp(-T[:n] / tau) + 0.7
+    recorded[1000] = np.nan
+    assert sensor_fault.undone is not None
+    found = sensor_fault.undone(recorded, RATE, {}, recorded)
+    assert np.isnan(found[1000])
+    left = np.delete(found - signal, 1000)
+    np.testing.assert_allclose(left - left.mean(), 0.0, atol=0.04 * AMPLITUDE)
+
+
+def test_undoing_is_the_inverse_of_what_a_twin_reads(model: RigModel) -> None:
+    """To rounding, but for a constant and the trend that eight whole cycles have."""
+    sensor_fault = fault(model, "sensor_high_pass", {"time_constant_s": 0.05})
+    signal = AMPLITUDE * np.cos(2 * np.pi * 8.0 * T)
+    found = sensor_fault.undone(read(sensor_fault, signal, np.full(N, np.nan)), RATE, {}, signal)
+    left = found - signal
+    np.testing.assert_allclose(left - np.polyval(np.polyfit(T, left, 1), T), 0.0, atol=1e-10 * AMPLITUDE)
+
+
 def test_a_charge_that_has_leaked_away_before_the_first_known_sample_is_none(model: RigModel) -> None:
     sensor_fault = fault(model, "sensor_high_pass", {"time_constant_s": 1.0 / RATE})
     recorded = np.where(T[-1] - 4.0 / RATE > T, np.nan, SIGNAL)
