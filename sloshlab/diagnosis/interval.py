@@ -79,7 +79,7 @@ def intervals_of(found: Findings, best: ScoredModel) -> dict[tuple[str, str], In
         of_noise = max(of_noise * noise, scatter.get(name, 0.0))
         of_simulation = EXACT * abs(estimate) if is_calibrated(parameter.name) else 0.0
         width = _DEVIATIONS * float(np.sqrt(of_noise**2 + of_belief**2 + of_simulation**2))
-        within = estimate + profiled_distance(problem, fit, name, sign * width)
+        within = estimate + profiled_distance(problem, fit, name, sign * width, jacobian)
         return float(np.clip(within, *candidate.bounds(parameter)))
 
     items = [(*number, sign) for number in numbers for sign in (-1.0, 1.0)]

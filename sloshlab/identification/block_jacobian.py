@@ -124,6 +124,20 @@ class BlockJacobian:
             first += size
         return BlockJacobian(len(columns), tuple(blocks))
 
+    def without(self, column: int) -> BlockJacobian:
+        """A copy that has one column less.
+
+        Parameters
+        ----------
+        column : int
+        """
+        left = []
+        for block in self.blocks:
+            seen = block.columns != column
+            others = block.columns[seen]
+            left.append(replace(block, columns=others - (others > column), values=block.values[:, seen]))
+        return BlockJacobian(self.n_columns - 1, tuple(left))
+
     def weighted(self, weights: FloatArray) -> BlockJacobian:
         """Every row times its weight."""
         return BlockJacobian(

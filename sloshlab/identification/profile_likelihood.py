@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from sloshlab.identification.block_jacobian import BlockJacobian
 from sloshlab.identification.free_run_fit import fitted
 from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem
 
@@ -22,7 +23,9 @@ _MOST_WIDENING: Final = 3.0
 """Factor by which a distance grows at once: the cost is not extrapolated further."""
 
 
-def profiled_distance(problem: FreeRunProblem, fit: FreeRunFit, name: str, distance: float) -> float:
+def profiled_distance(
+    problem: FreeRunProblem, fit: FreeRunFit, name: str, distance: float, jacobian: BlockJacobian
+) -> float:
     """Distance from the optimum at which the profile has risen as much as the curvature there promises.
 
     The rise that is asked for is that of the quadratic with the covariance of the fit at the given distance, which
@@ -38,6 +41,8 @@ def profiled_distance(problem: FreeRunProblem, fit: FreeRunFit, name: str, dista
         Of a free number.
     distance : float
         Signed, in units of the number; where the covariance says that the rise is.
+    jacobian : BlockJacobian
+        At the optimum. Every refit begins with it, and computes it anew where a step shows that it is wrong there.
 
     Returns
     -------
@@ -64,7 +69,9 @@ def profiled_distance(problem: FreeRunProblem, fit: FreeRunFit, name: str, dista
         # All others begin where the covariance has them follow.
         moved = problem.values(centre + along * reached / fit.scales[i])
         held = FreeRunProblem(problem.model, problem.runs, problem.candidates, {name: fit.values[name] + reached})
-        beside = fitted(held, moved, n_iterations=4, stages=(0.0,), is_last=False)[0]
+        beside, _ = fitted(
+            held, moved, n_iterations=4, stages=(0.0,), known=jacobian.without(at), is_last=False
+        )
         rise = beside.cost - least
         root = float(np.sqrt(max(rise, 0.0)))
         if rise >= asked:

@@ -130,7 +130,11 @@ class ForwardGrowth:
             # A fit with instants of its own in each run may take as much as all that was begun before it.
             if not only and not self.known.has_budget():
                 break
-            self.known.keep(self.fitted_to_the_end(some, bases[0], self.known.hopeless_cost()))
+            self.known.keep(
+                self.fitted_to_the_end(
+                    some, bases[0], self.known.hopeless_cost(), most_cost=self.known.most_cost_beside(bases[0])
+                )
+            )
 
     def fitted_to_the_end(
         self,
@@ -138,6 +142,7 @@ class ForwardGrowth:
         base: FreeRunFit,
         hopeless_cost: HopelessCost | None = None,
         stages: Sequence[float] = (),
+        most_cost: float = np.inf,
     ) -> Iterator[FreeRunFit]:
         """Fits on all runs, beside a base, as the workers of the model make them.
 
@@ -148,10 +153,13 @@ class ForwardGrowth:
         hopeless_cost : callable, optional
         stages : sequence of float, optional
             Of noise inflation, in place of those in which residuals show.
+        most_cost : float, optional
+            Beyond which numbers of single runs are not sought anew.
         """
 
         def to_the_end(fit: FreeRunFit) -> FreeRunFit:
-            return replace(full_fit(self.known.runs, fit, base, hopeless_cost, stages), candidates=())
+            found = full_fit(self.known.runs, fit, base, hopeless_cost, stages, most_cost)
+            return replace(found, candidates=())
 
         runs = self.known.runs
         fits = runs.effort.spent_on(runs.model.executor, to_the_end, coarse)
@@ -200,7 +208,14 @@ class ForwardGrowth:
         """The first of the leading forces that leaves nothing beside a fit; those before it are kept, too."""
         for candidate, numbers in matched.leading:
             self._say_fitting((*best.candidates, candidate))
-            fit = compensated_fit(self.known.runs, best, candidate, numbers, self.known.hopeless_cost())
+            fit = compensated_fit(
+                self.known.runs,
+                best,
+                candidate,
+                numbers,
+                self.known.hopeless_cost(),
+                self.known.most_cost_beside(best),
+            )
             self.known.keep([fit])
             if not fit.trouble and not self.known.remains(fit):
                 return candidate

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+import numpy as np
+
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
 from sloshlab.identification.free_run_fit import fitted, stages_for
 from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem
@@ -41,6 +43,7 @@ def full_fit(
     base: FreeRunFit,
     hopeless_cost: HopelessCost | None = None,
     stages: Sequence[float] = (),
+    most_cost: float = np.inf,
 ) -> FreeRunFit:
     """A fit on all runs, from a coarse one beside a base.
 
@@ -52,13 +55,15 @@ def full_fit(
     hopeless_cost : callable, optional
     stages : sequence of float, optional
         Of noise inflation, in place of those in which residuals show.
+    most_cost : float, optional
+        Beyond which numbers of single runs are not sought anew.
     """
     problem = runs.problem_of(coarse)
     fit = at_its_optimum(problem, {**base.values, **coarse.values}, hopeless_cost, stages)
     # What an effect has of its own in a run, such as an instant.
     own = {problem.owner(name) for name in problem.names[problem.n_baseline :]}
     alone = [run for run in runs.runs if run[0].run.is_free or run[0].run.name in own]
-    if fit.trouble or not alone or problem.is_down_to_noise(fit):
+    if fit.trouble or not alone or fit.cost > most_cost or problem.is_down_to_noise(fit):
         return fit
     # Each of these by itself, from many starts: one that comes to rest elsewhere, or has its pulses at other
     # instants, holds all other numbers back.
@@ -75,6 +80,7 @@ def compensated_fit(
     candidate: Candidate,
     numbers: Mapping[str, float],
     hopeless_cost: HopelessCost | None = None,
+    most_cost: float = np.inf,
 ) -> FreeRunFit:
     """A fit from matched numbers, first of all others beside them, which had taken the place of the effect.
 
@@ -87,8 +93,10 @@ def compensated_fit(
     numbers : mapping
         Of the candidate, named as in a fit.
     hopeless_cost : callable, optional
+    most_cost : float, optional
+        As of `full_fit`.
     """
     beside = FreeRunProblem(runs.model, runs.runs, (*base.candidates, candidate), numbers, runs.effort)
     start = {**base.values, **numbers}
     held = at_its_optimum(beside, beside.values(beside.theta_of(start)), hopeless_cost)
-    return held if held.trouble else full_fit(runs, held, base, hopeless_cost)
+    return held if held.trouble else full_fit(runs, held, base, hopeless_cost, most_cost=most_cost)

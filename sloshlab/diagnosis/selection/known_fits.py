@@ -220,6 +220,21 @@ class KnownFits:
 
         return hopeless_cost
 
+    def most_cost_beside(self, base: FreeRunFit) -> float:
+        """Cost of a fit with one effect more that explains next to nothing of what the best model explains.
+
+        Infinite as long as none is better than the base: an effect may explain nothing while runs come to rest
+        elsewhere, or have its pulses at other instants.
+
+        Parameters
+        ----------
+        base : FreeRunFit
+        """
+        known = self.of_model(keys_of(base.candidates))
+        if known is None or not self.best.cost < known.cost:
+            return np.inf
+        return known.cost - LEAST_EXPLAINED * (known.cost - self.best.cost)
+
     def is_more_probable(self, fits: Sequence[FreeRunFit], than: FreeRunFit) -> bool:
         """Whether one of some fits has more evidence than a simpler one.
 

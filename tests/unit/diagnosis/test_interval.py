@@ -55,7 +55,7 @@ def test_its_ends_are_where_the_profile_has_risen(
     found, problem, fit, name = cubic
     monkeypatch.setattr(interval_module, "EXACT", 0.0)
     if not is_profiled:
-        monkeypatch.setattr(interval_module, "profiled_distance", lambda problem, fit, name, distance: distance)
+        monkeypatch.setattr(interval_module, "profiled_distance", lambda problem, fit, name, distance, jacobian: distance)
     [interval] = intervals_of(cast(Any, found), cast(Any, SimpleNamespace(fit=fit, fitted_rms=1.0))).values()
     assert interval.low < CUBIC_N_PER_M3 < interval.high
     # The gain is what is not known of it, and its prior counts as often as likelihoods are tempered.
@@ -69,12 +69,13 @@ def test_a_profile_goes_on_where_a_covariance_is_too_small_and_nowhere_where_it_
 ) -> None:
     _, problem, fit, name = cubic
     theta = problem.theta_of(fit.values)
-    covariance = np.linalg.pinv(problem.central_jacobian(theta).normal() + np.diag(problem.prior_weights(theta)))
+    jacobian = problem.central_jacobian(theta)
+    covariance = np.linalg.pinv(jacobian.normal() + np.diag(problem.prior_weights(theta)))
     for share in (0.25, 4.0):
         other = replace(fit, covariance=share * covariance)
         i = fit.names.index(name)
         given = sign * 1.645 * np.sqrt(share * covariance[i, i]) * fit.scales[i]
-        reached = profiled_distance(problem, other, name, given)
+        reached = profiled_distance(problem, other, name, given, jacobian)
         if share > 1:
             assert reached == given
         else:
@@ -87,7 +88,7 @@ def test_a_force_is_known_no_better_than_a_simulation_is_exact(
 ) -> None:
     found, _, fit, _ = cubic
     best = cast(Any, SimpleNamespace(fit=fit, fitted_rms=1.0))
-    monkeypatch.setattr(interval_module, "profiled_distance", lambda problem, fit, name, distance: distance)
+    monkeypatch.setattr(interval_module, "profiled_distance", lambda problem, fit, name, distance, jacobian: distance)
     halves = []
     for exact in (0.0, 0.01):
         monkeypatch.setattr(interval_module, "EXACT", exact)

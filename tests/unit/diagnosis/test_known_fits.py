@@ -7,15 +7,22 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
-from recorded_oscillators import decays, rig
+from recorded_oscillators import decays, effect, rig, surroundings
 
+from sloshlab.diagnosis.selection import full_fit as full_fit_module
 from sloshlab.diagnosis.selection import known_fits
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
+from sloshlab.diagnosis.selection.full_fit import full_fit
 from sloshlab.diagnosis.selection.known_fits import KnownFits
-from sloshlab.identification.free_run_problem import FreeRunFit
+from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.identification.observations import observations
 from sloshlab.identification.rig_model import RigModel
+from sloshlab.missing_physics import effects
+from sloshlab.missing_physics.candidate import Candidate
+
+assert effects.__all__
 
 
 def runs_of(folder: Path) -> FittedRuns:
@@ -73,6 +80,36 @@ def test_of_every_model_the_fit_of_the_lowest_cost_is_kept(tmp_path: Path) -> No
     assert known.of_length(0) == known.in_order() == [known.best]
     assert known.best_of(1) is None
     assert known.failed == {"": "does not run"}
+
+
+def test_runs_are_sought_anew_only_beside_what_explains_a_tenth_of_the_best(tmp_path: Path) -> None:
+    candidate = Candidate(effect("structure.cubic_stiffness"), surroundings(runs_of(tmp_path).model))
+    known, nothing = KnownFits(runs_of(tmp_path)), FreeRunFit((), {}, 1000.0, 1000.0)
+    assert known.most_cost_beside(nothing) == np.inf
+    known.keep([nothing])
+    # An effect may explain nothing until its runs are sought anew, as long as none is known that does.
+    assert known.most_cost_beside(nothing) == np.inf
+    known.keep([FreeRunFit((candidate,), {}, 100.0, 100.0)])
+    assert known.most_cost_beside(nothing) == pytest.approx(910.0)
+    assert known.most_cost_beside(known.best) == np.inf
+
+
+@pytest.mark.parametrize(("most_cost", "is_sought"), [(np.inf, True), (0.0, False)])
+def test_a_fit_that_explains_too_little_keeps_the_numbers_of_its_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, most_cost: float, is_sought: bool
+) -> None:
+    sought: list[FreeRunFit] = []
+
+    def values_of_runs(model: RigModel, runs: Any, fit: FreeRunFit, effort: Any) -> dict[str, float]:
+        sought.append(fit)
+        return dict(fit.values)
+
+    monkeypatch.setattr(full_fit_module, "values_of_runs", values_of_runs)
+    monkeypatch.setattr(FreeRunProblem, "is_down_to_noise", lambda self, fit: False)
+    runs = runs_of(tmp_path)
+    begun = FreeRunFit((), dict(runs.model.believed), 0.0, 0.0)
+    full_fit(runs, begun, begun, most_cost=most_cost)
+    assert bool(sought) is is_sought
 
 
 def test_the_leading_fits_are_at_their_optima_in_the_noise_that_is_known_by_then(

@@ -54,6 +54,16 @@ def test_columns_are_made_of_the_blocks_that_are_given() -> None:
     assert [block.columns.tolist() for block in found.blocks] == [[0], [], [1]]
 
 
+@pytest.mark.parametrize("column", range(4))
+def test_without_a_column_it_is_a_copy_of_all_others(column: int) -> None:
+    matrix = dense()
+    jacobian = in_blocks(matrix)
+    found = jacobian.without(column)
+    np.testing.assert_array_equal(as_dense(found), np.delete(matrix, column, axis=1))
+    found.correct(np.ones(3), np.ones(sum(SIZES)))
+    np.testing.assert_array_equal(as_dense(jacobian), matrix)
+
+
 def test_a_part_has_some_blocks_and_the_columns_in_the_order_asked_for() -> None:
     """Blocks 0 and 2 see columns 0, 1 and 2; the last one is left out."""
     matrix = dense()
