@@ -23,7 +23,14 @@ from sealed_trial.laboratory.recorder import drawn_recorder
 from sealed_trial.laboratory.sensors import Sensor, drawn_sensor
 from sealed_trial.laboratory.test_plan import PLANS, TestPlan, drawn_plan
 from sealed_trial.look_alikes import possible_look_alikes
-from sealed_trial.strength import LEAST_STRENGTH, ONLY_DAMPING, QUICK, STRENGTH_TOLERANCE, NoiseFloor, magnitude_for
+from sealed_trial.strength import (
+    LEAST_STRENGTH,
+    ONLY_DAMPING,
+    QUICK,
+    STRENGTH_TOLERANCE,
+    NoiseFloor,
+    magnitude_for,
+)
 
 WEAKEST_CLEAR, STRONGEST_CLEAR = 3.5, 30.0
 WEAKEST_MASKED, STRONGEST_MASKED = 0.3, 3.0

@@ -69,9 +69,7 @@ def profiled_distance(
         # All others begin where the covariance has them follow.
         moved = problem.values(centre + along * reached / fit.scales[i])
         held = FreeRunProblem(problem.model, problem.runs, problem.candidates, {name: fit.values[name] + reached})
-        beside, _ = fitted(
-            held, moved, n_iterations=4, stages=(0.0,), known=jacobian.without(at), is_last=False
-        )
+        beside, _ = fitted(held, moved, n_iterations=4, stages=(0.0,), known=jacobian.without(at), is_last=False)
         rise = beside.cost - least
         root = float(np.sqrt(max(rise, 0.0)))
         if rise >= asked:

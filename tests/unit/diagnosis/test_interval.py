@@ -55,7 +55,9 @@ def test_its_ends_are_where_the_profile_has_risen(
     found, problem, fit, name = cubic
     monkeypatch.setattr(interval_module, "EXACT", 0.0)
     if not is_profiled:
-        monkeypatch.setattr(interval_module, "profiled_distance", lambda problem, fit, name, distance, jacobian: distance)
+        monkeypatch.setattr(
+            interval_module, "profiled_distance", lambda problem, fit, name, distance, jacobian: distance
+        )
     [interval] = intervals_of(cast(Any, found), cast(Any, SimpleNamespace(fit=fit, fitted_rms=1.0))).values()
     assert interval.low < CUBIC_N_PER_M3 < interval.high
     # The gain is what is not known of it, and its prior counts as often as likelihoods are tempered.
@@ -88,7 +90,9 @@ def test_a_force_is_known_no_better_than_a_simulation_is_exact(
 ) -> None:
     found, _, fit, _ = cubic
     best = cast(Any, SimpleNamespace(fit=fit, fitted_rms=1.0))
-    monkeypatch.setattr(interval_module, "profiled_distance", lambda problem, fit, name, distance, jacobian: distance)
+    monkeypatch.setattr(
+        interval_module, "profiled_distance", lambda problem, fit, name, distance, jacobian: distance
+    )
     halves = []
     for exact in (0.0, 0.01):
         monkeypatch.setattr(interval_module, "EXACT", exact)

@@ -100,7 +100,7 @@ def test_a_sensor_that_was_charged_before_the_run_is_no_misfit(model: RigModel, 
 
 @pytest.mark.parametrize("n", [3930, 3970])
 def test_a_discharge_is_undone_but_for_a_constant_wherever_a_run_ends(model: RigModel, n: int) -> None:
-    """What has leaked away by then is no zero of the recorder: taken for one it left a ramp of a whole amplitude."""
+    """What has leaked away by then is no zero of the recorder: taken for one it left a ramp of an amplitude."""
     tau, signal = 0.2, SIGNAL[:n]
     sensor_fault = fault(model, "sensor_high_pass", {"time_constant_s": tau})
     factor = 1j * OMEGA * tau / (1 + 1j * OMEGA * tau)

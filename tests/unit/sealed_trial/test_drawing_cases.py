@@ -190,7 +190,7 @@ def test_an_effect_whose_essential_part_is_hidden_is_not_drawn() -> None:
 
 
 class FloorWithFewBaselines:
-    """Tells a strength, as large as its size, about three baselines: beyond a factor of two of all it seems more."""
+    """A strength, as large as its size, about three baselines: beyond a factor of two of all it seems more."""
 
     def __init__(self) -> None:
         self.start_anew()
