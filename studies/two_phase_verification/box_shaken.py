@@ -54,6 +54,13 @@ POINTS: Final = {
         Shaking(0.5, 11.4, 48, 16),
     ),
     "campaign": tuple(replace(case, cells_per_height=12) for case in CAMPAIGN),
+    "weakest": tuple(Shaking(0.25, frequency_hz, 48, 12) for frequency_hz in (8.0, 9.5, 11.0, 12.5, 14.5, 18.0)),
+    "fills": tuple(
+        Shaking(level_g, frequency_hz, 24, 12, filling_level=filling_level)
+        for level_g in (1.5, 3.0)
+        for frequency_hz in (9.0, 13.0, 17.0)
+        for filling_level in (0.25, 0.5, 0.75)
+    ),
 }
 """What can be computed, by name."""
 
@@ -68,7 +75,7 @@ def box_of(case: Shaking) -> TwoPhaseBox:
     """
     plane = filled_two_phase_tank(
         TANK,
-        0.5,
+        case.filling_level,
         case.cells_per_height,
         fluids=Fluids(
             surface_tension_n_per_m=case.surface_tension_n_per_m, gas_density_kg_per_m3=case.gas_density_kg_per_m3

@@ -34,7 +34,7 @@ TANK: Final = Box(0.1172, 0.0272, 0.078)
 RISE_CYCLES: Final = 3
 
 
-_LATER: Final = ("advancing_angle_deg", "receding_angle_deg", "line_sticks")
+_LATER: Final = ("advancing_angle_deg", "receding_angle_deg", "line_sticks", "filling_level")
 
 
 @dataclass(frozen=True)
@@ -57,6 +57,8 @@ class Shaking:
     advancing_angle_deg, receding_angle_deg : float
     line_sticks : bool
         Contact line, as of `Walls`.
+    filling_level : float
+        Volume of the liquid over that of the box.
     """
 
     acceleration_g: float
@@ -71,6 +73,7 @@ class Shaking:
     advancing_angle_deg: float = Walls().advancing_angle_deg
     receding_angle_deg: float = Walls().receding_angle_deg
     line_sticks: bool = False
+    filling_level: float = 0.5
 
     @property
     def name(self) -> str:
@@ -90,6 +93,7 @@ class Shaking:
             "layer_frequency_hz": "walls before and behind",
             "seed": f"seed {self.seed}",
             "gas_density_kg_per_m3": f"gas of {self.gas_density_kg_per_m3:g} kg/m³",
+            "filling_level": f"α = {self.filling_level:g}",
         }
         return ", ".join(text for name, text in told.items() if getattr(self, name) != getattr(usual, name))
 
@@ -143,7 +147,7 @@ def shaken(case: Shaking) -> Shaken:
     """
     setup = filled_two_phase_tank(
         TANK,
-        0.5,
+        case.filling_level,
         case.cells_per_height,
         fluids=Fluids(
             surface_tension_n_per_m=case.surface_tension_n_per_m, gas_density_kg_per_m3=case.gas_density_kg_per_m3

@@ -39,7 +39,16 @@ def test_a_run_that_was_stopped_goes_on_to_the_same_result(
 
 def test_every_case_has_a_file_of_its_own() -> None:
     cases = [case for group in box_shaken.POINTS.values() for case in group]
-    assert len({box_shaken.beside(Path("box.json"), case) for case in cases}) == len(cases) == 57
+    assert len({box_shaken.beside(Path("box.json"), case) for case in cases}) == len(cases) == 81
+
+
+@pytest.mark.parametrize("filling_level", [0.25, 0.75])
+def test_a_tank_has_the_liquid_of_its_fill(filling_level: float) -> None:
+    half, other = (box_shaken.box_of(replace(CASE, filling_level=level)) for level in (0.5, filling_level))
+    assert other.setup.liquid_mass_kg / half.setup.liquid_mass_kg == pytest.approx(2 * filling_level)
+    assert other.liquid_fraction.sum() / half.liquid_fraction.sum() == pytest.approx(2 * filling_level, rel=1e-3)
+    assert "α" not in CASE.differs
+    assert replace(CASE, filling_level=filling_level).differs == f"α = {filling_level:g}"
 
 
 def test_kept_results_account_for_all_energy_and_liquid() -> None:
