@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -84,6 +85,9 @@ def compensated_fit(
 ) -> FreeRunFit:
     """A fit from matched numbers, first of all others beside them, which had taken the place of the effect.
 
+    The others begin where the base has them and where they are believed, and the better fit goes on: without the
+    effect a frequency of the base may have come to another resonance, from which no step leads back.
+
     Parameters
     ----------
     runs : FittedRuns
@@ -97,6 +101,13 @@ def compensated_fit(
         As of `full_fit`.
     """
     beside = FreeRunProblem(runs.model, runs.runs, (*base.candidates, candidate), numbers, runs.effort)
-    start = {**base.values, **numbers}
-    held = at_its_optimum(beside, beside.values(beside.theta_of(start)), hopeless_cost)
+    believed = {name: value for name, value in runs.model.believed.items() if not beside.owner(name)}
+
+    def compensated(start: Mapping[str, float]) -> FreeRunFit:
+        begun = beside.values(beside.theta_of({**start, **numbers}))
+        return replace(at_its_optimum(beside, begun, hopeless_cost), candidates=())
+
+    starts = [base.values, {**base.values, **believed}]
+    fits = list(runs.effort.spent_on(runs.model.executor, compensated, starts))
+    held = replace(min(fits, key=lambda fit: fit.cost), candidates=beside.candidates)
     return held if held.trouble else full_fit(runs, held, base, hopeless_cost, most_cost=most_cost)
