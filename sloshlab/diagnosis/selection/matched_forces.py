@@ -26,8 +26,8 @@ class MatchedForces:
         Of every candidate that was matched the numbers that explain some of what is missing, the best first; by
         key.
     left : dict
-        Squares that each leaves of what is missing at all places, in noise variances; by key. None of forces that
-        are linear in the motion, as what the baseline is off by hides them.
+        Squares that each, or a form that reduces to it, leaves of what is missing at all places, in noise
+        variances; by key. None of forces that are linear in the motion, as what the baseline is off by hides them.
     leading : list of (Candidate, mapping)
         Those that leave least, with their numbers, the best first.
     """
@@ -110,8 +110,8 @@ class _Matches:
                 key: [match.numbers for match in matches[:N_ALIKE] if match.misfit < 1.0 - LEAST_EXPLAINED]
                 for key, matches in self.of.items()
             },
-            {candidate.key: self.left(candidate) for candidate in self.candidates if self.is_compared(candidate)},
-            [(candidate, self.of[candidate.key][0].numbers) for candidate in sorted(leading, key=self.left)],
+            {candidate.key: self.least(candidate) for candidate in self.candidates if self.is_compared(candidate)},
+            [(candidate, self.of[candidate.key][0].numbers) for candidate in sorted(leading, key=self.rank_of)],
             self,
         )
 
@@ -148,11 +148,26 @@ class _Matches:
         explained = 1.0 - self.of[candidate.key][0].misfit
         return self._everything - explained * self._at(candidate).power
 
+    def least(self, candidate: Candidate) -> float:
+        """The least that it or a form leaves which reduces to it.
+
+        Noise of a recorded velocity has either sign where a place sticks. It makes dry friction jump there, but
+        not the spring behind a play, which is dry friction all the same where it is stiff.
+        """
+        wider = [other for other in self.candidates if other.reduces_to(candidate)]
+        return min(map(self.left, (candidate, *wider)))
+
+    def rank_of(self, candidate: Candidate) -> tuple[float, int]:
+        """For an order in which of two forms that may leave the same the one with fewer numbers comes first."""
+        return self.least(candidate), len(candidate.names)
+
     def hopeful(self) -> list[Candidate]:
-        """Those that are not hopeless beside the best one, which comes first."""
-        matched = sorted((candidate for candidate in self.candidates if candidate.key in self.of), key=self.left)
-        most = HOPELESS_COST_RATIO * min(map(self.left, matched), default=0.0)
-        return [candidate for candidate in matched if self.left(candidate) <= most]
+        """Those that are not hopeless beside the best one, in their order."""
+        matched = sorted(
+            (candidate for candidate in self.candidates if candidate.key in self.of), key=self.rank_of
+        )
+        most = HOPELESS_COST_RATIO * min(map(self.least, matched), default=0.0)
+        return sorted((candidate for candidate in matched if self.least(candidate) <= most), key=self.rank_of)
 
     def explains(self, candidate: Candidate) -> bool:
         """Whether it explains some of what is missing at its place."""

@@ -10,6 +10,7 @@ from recorded_oscillators import DAMPING, LIQUID_KG, MASS_KG, RATE_HZ, STIFFNESS
 from scipy.integrate import solve_ivp
 
 from sloshlab.diagnosis.selection import forward_growth
+from sloshlab.diagnosis.selection import matched_forces as module
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
 from sloshlab.diagnosis.selection.full_fit import compensated_fit
 from sloshlab.diagnosis.selection.matched_forces import matched_forces
@@ -142,3 +143,30 @@ def test_without_a_remainder_single_effects_end_the_search(
 
 def frequency_hz(numbers: dict[str, float]) -> float:
     return float(np.sqrt(numbers[f"{CUSHION}.stiffness_n_per_m"] / numbers[f"{CUSHION}.mass_kg"]) / (2 * np.pi))
+
+
+def test_a_limit_of_a_form_that_matches_is_not_passed_over(search: tuple[ModelSelection, FreeRunFit]) -> None:
+    """Where a place sticks, dry friction jumps with the noise of its velocity; a spring behind a play does not."""
+    selection, _ = search
+    left = {
+        "structure.friction_behind_play": 100.0,
+        "structure.quadratic_drag": 150.0,
+        "structure.hysteresis": 350.0,
+        "structure.coulomb_friction": 400.0,
+    }
+    pool = [candidate for candidate in candidates(selection.growth.at) if candidate.key in left]
+
+    class Matches(module._Matches):
+        def __init__(self) -> None:
+            self.candidates = pool
+            self.of = {candidate.key: [] for candidate in pool}
+
+        def left(self, candidate: Candidate) -> float:
+            return left[candidate.key]
+
+    found = Matches().hopeful()
+    assert [candidate.effect.name for candidate in found] == [
+        "coulomb_friction",
+        "friction_behind_play",
+        "quadratic_drag",
+    ]
