@@ -29,8 +29,6 @@ Kept = Mapping[str, Mapping[str, Any]]
 
 BOX_KEPT: Final = Path(__file__).with_name("box_shaken.json")
 PLANE_KEPT: Final = Path(__file__).with_name("shaken.json")
-BEAM: Final = Shaking(2.04, 10.7, 24, 16)
-"""The beam's point of the box, with its finest cells; it is in no map."""
 
 
 def rig_of(filling_level: float) -> Rig:

@@ -29,7 +29,7 @@ class MatchedForces:
         Squares that each, or a form that reduces to it, leaves of what is missing at all places, in noise
         variances; by key. None of forces that are linear in the motion, as what the baseline is off by hides them.
     leading : list of (Candidate, mapping)
-        Those that leave least, with their numbers, the best first.
+        Those that leave least, with their numbers, the best first; what a form reduces to before it.
     """
 
     starts: dict[str, list[dict[str, float]]] = field(default_factory=dict)
@@ -163,10 +163,8 @@ class _Matches:
 
     def hopeful(self) -> list[Candidate]:
         """Those that are not hopeless beside the best one, in their order."""
-        matched = sorted(
-            (candidate for candidate in self.candidates if candidate.key in self.of), key=self.rank_of
-        )
-        most = HOPELESS_COST_RATIO * min(map(self.least, matched), default=0.0)
+        matched = [candidate for candidate in self.candidates if candidate.key in self.of]
+        most = HOPELESS_COST_RATIO * min(map(self.left, matched), default=0.0)
         return sorted((candidate for candidate in matched if self.least(candidate) <= most), key=self.rank_of)
 
     def explains(self, candidate: Candidate) -> bool:
