@@ -8,6 +8,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from sloshlab.missing_physics.units import Dimension
+
 FloatArray = NDArray[np.float64]
 _STANDARD_UNCERTAINTY: Final = 3**-0.5
 """Over a tolerance: of a rectangular distribution within it (GUM, JCGM 100:2008, 4.3.7)."""
@@ -38,6 +40,8 @@ class BaselineParameter:
         The only one to which it belongs; empty where it belongs to all.
     is_damping : bool
         Whether it is a loss of the structure or of the liquid.
+    dimension : Dimension, optional
+        Of a number that is counted over another one; else that of its units.
     """
 
     name: str
@@ -50,6 +54,7 @@ class BaselineParameter:
     channel: str = ""
     run: str = ""
     is_damping: bool = False
+    dimension: Dimension | None = None
 
     @property
     def bounds(self) -> tuple[float, float]:

@@ -169,6 +169,13 @@ class BlockJacobian:
             found[np.ix_(block.columns, block.columns)] += block.values.T @ block.values
         return found
 
+    def slopes(self) -> FloatArray:
+        """Euclidean norms of all columns, shape (n_columns,)."""
+        squares = np.zeros(self.n_columns)
+        for block in self.blocks:
+            squares[block.columns] += np.einsum("ij,ij->j", block.values, block.values)
+        return np.asarray(np.sqrt(squares))
+
     def transposed_times(self, vector: FloatArray) -> FloatArray:
         """Jᵀ r, shape (n_columns,)."""
         found = np.zeros(self.n_columns)
@@ -180,19 +187,20 @@ class BlockJacobian:
         """J s, one value per row."""
         return np.concatenate([block.values @ vector[block.columns] for block in self.blocks] or [np.zeros(0)])
 
-    def correct(self, step: FloatArray, change: FloatArray) -> None:
-        """Broyden update: the least change with which the matrix reproduces a step, zeros kept; in place.
+    def correct(self, steps: FloatArray, changes: FloatArray) -> None:
+        """Broyden update: the least change with which the matrix reproduces some steps, zeros kept; in place.
 
         Parameters
         ----------
-        step : ndarray, shape (n_columns,)
-        change : ndarray
-            Of the residuals by the step.
+        steps : ndarray, shape (n_columns,) or (n_columns, n)
+            Linearly independent; of those that are equal in the columns of a block none is reproduced there.
+        changes : ndarray, shape (n_rows,) or (n_rows, n)
+            Of the residuals by each step.
 
         Notes
         -----
         Broyden (1965), doi:10.1090/S0025-5718-1965-0198670-6; with a pattern of zeros, Schubert (1970),
-        doi:10.1090/S0025-5718-1970-0258276-9.
+        doi:10.1090/S0025-5718-1970-0258276-9; of several steps at once, Schnabel (1983), CU-CS-247-83.
 
         Examples
         --------
@@ -201,11 +209,11 @@ class BlockJacobian:
         >>> found.times(np.array([1.0, 1.0])).tolist(), found.times(np.array([1.0, 0.0])).tolist()
         ([5.0, 4.0], [3.0, 0.0])
         """
+        steps, changes = steps.reshape(self.n_columns, -1), changes.reshape(len(changes), -1)
         for block in self.blocks:
-            own = step[block.columns]
-            length = float(own @ own)
-            if length > 0:
+            own = steps[block.columns]
+            if own.any():
                 # Each block divides by the length of its own part of the step: the update of Schubert, row by
                 # row the least change that leaves zeros alone. Broyden's update would fill them.
-                missed = change[block.rows] - block.values @ own
-                block.values[...] += np.multiply.outer(missed, own / length)
+                missed = changes[block.rows] - block.values @ own
+                block.values[...] += missed @ np.linalg.pinv(own)

@@ -139,13 +139,18 @@ class _LevenbergMarquardt:
         self.inflation, self.inflation_weights = inflation, self.problem.inflation_weights(inflation)
         damping, is_fresh = 1e-3, False
         # The Jacobian of an earlier stage, or a warm start, serves until a step shows that it is wrong.
-        is_wanted, worth = not self.jacobian.blocks, 0.0
+        is_wanted, worth, last_gain = not self.jacobian.blocks, 0.0, np.inf
         most_iterations = n_iterations if inflation > 0 else 2 * n_iterations
         for iteration in range(most_iterations):
             if is_wanted:
-                # Wide differences while the noise is inflated, fine ones for the optimum itself.
+                # Wide differences while the noise is inflated, past what jumps with the parameters. At the optimum
+                # they change the cost by no more than the decrease at which the stage ends.
+                most = None
+                if inflation == 0 and self.jacobian.blocks:
+                    slopes = np.maximum(self.jacobian.slopes(), 1e-300)
+                    most = np.sqrt(tolerance * _LAST_STAGE_FACTOR * self._cost()) / slopes
                 self.jacobian = self.problem.jacobian(
-                    self.theta, self.residual, range(self.theta.size), coarse=inflation > 0
+                    self.theta, self.residual, range(self.theta.size), coarse=inflation > 0, most=most
                 )
                 is_fresh = True
             least = tolerance * (1.0 if inflation > 0 else _LAST_STAGE_FACTOR)
@@ -165,7 +170,13 @@ class _LevenbergMarquardt:
                 break
             # A step that brings far less than predicted shows that a corrected Jacobian has become wrong, and one
             # that brings less per simulation than the last new Jacobian did, that another one is worth its price.
-            is_wanted = is_done or gain < max(_LEAST_GAIN_RATIO * predicted, worth)
+            is_wanted = (
+                is_done
+                or gain < max(_LEAST_GAIN_RATIO * predicted, worth)
+                # Steps that grow smaller as slowly as the last ones would not end the fit in its iterations.
+                or (needs_fresh and gain * (gain / last_gain) ** (most_iterations - 1 - iteration) > least)
+            )
+            last_gain = np.inf if is_wanted else gain
             is_fresh = is_fresh and gain <= 0
         return True
 
@@ -198,12 +209,10 @@ class _LevenbergMarquardt:
                 return np.inf
             return huber_cost(inflation_weights * r, limit) + self.problem.prior_cost(at, inflation)
 
+        metric = _metric(self.hessian, self.problem.changes_of_scale(theta))
         before, promised, growth = cost(theta, residual), 0.0, _DAMPING_GROWTH
         while damping < _LARGEST_DAMPING:
-            # Marquardt's scaling, by the diagonal of the Hessian: parameters differ by orders of magnitude in
-            # sensitivity.
-            lift = np.diag(damping * np.maximum(np.diag(self.hessian), 1e-12))
-            tried = _step_within_bounds(self.problem, theta, self.hessian + lift, gradient)
+            tried = _step_within_bounds(self.problem, theta, self.hessian + damping * metric, gradient)
             step = tried - theta
             # Decrease by the undamped model, so that it can be compared with the actual one.
             predicted = -float(2 * gradient @ step + step @ self.hessian @ step)
@@ -237,6 +246,30 @@ class _LevenbergMarquardt:
             self.problem.scales,
             self.problem.prior_weights(self.theta),
         )
+
+
+def _metric(hessian: FloatArray, changes_of_scale: Sequence[FloatArray]) -> FloatArray:
+    """Of the size of a step that damping makes shorter.
+
+    Marquardt's scaling, by the diagonal of the Hessian, as parameters differ by orders of magnitude in
+    sensitivity. Changes of scale take the place of one number each: damped one by one, masses and forces would
+    hold each other where their ratios alone are known.
+
+    Parameters
+    ----------
+    hessian : ndarray, shape (n, n)
+    changes_of_scale : sequence of ndarray, shape (n,)
+    """
+    basis, left = np.eye(len(hessian)), np.eye(len(hessian))
+    for direction in changes_of_scale:
+        # The number that makes most of it, beside the directions that have taken a place.
+        apart = left @ direction
+        place = int(np.argmax(np.abs(apart)))
+        basis[:, place] = direction
+        left -= np.outer(apart, left[place]) / apart[place]
+    inverse = np.linalg.inv(basis)
+    diagonal = np.einsum("ij,ik,kj->j", basis, hessian, basis)
+    return np.asarray((inverse.T * np.maximum(diagonal, 1e-12)) @ inverse)
 
 
 def stages_for(problem: FreeRunProblem, fit: FreeRunFit) -> tuple[float, ...]:

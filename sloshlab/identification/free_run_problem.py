@@ -20,6 +20,7 @@ from sloshlab.identification.observations import Observation
 from sloshlab.identification.owning_runs import owning_runs
 from sloshlab.missing_physics.candidate import Candidate, channels_of, extension_of
 from sloshlab.missing_physics.extension import Extension, left_out_of_drives
+from sloshlab.missing_physics.units import DIMENSIONLESS, Dimension, dimension_of, named_and_units
 
 FloatArray = NDArray[np.float64]
 _Label = TypeVar("_Label")
@@ -116,6 +117,7 @@ class _Number:
     channels: tuple[str, ...]
     is_reading: bool = False
     is_damping: bool = False
+    dimension: Dimension = DIMENSIONLESS
 
 
 class FreeRunProblem:
@@ -175,6 +177,8 @@ class FreeRunProblem:
         self._channels_changed = [number.channels for number in free]
         self._is_reading = np.array([number.is_reading for number in baseline], bool)
         self._is_damping = [number.is_damping for number in free]
+        powers = [(number.dimension.mass, number.dimension.length) for number in free]
+        self._powers = np.array(powers, np.float64).reshape(-1, 2)
         ends = np.cumsum([0] + [observation.spectra.size for run in self.runs for observation in run])
         self._rows = [slice(int(first), int(end)) for first, end in pairwise(ends)]
 
@@ -318,11 +322,15 @@ class FreeRunProblem:
         *,
         coarse: bool = False,
         forward: bool = True,
+        most: FloatArray | None = None,
     ) -> BlockJacobian:
         """Derivatives of the residuals by some scaled parameters, by finite differences.
 
         Coarse differences are wider: the residual is rough on a small scale with dry friction and contacts. Steps
-        are upward, or downward where not `forward`, and away from bounds.
+        are upward, or downward where not `forward`, and away from bounds. What is given as `most` limits the
+        steps of all parameters.
+
+        Those by all parameters are right along changes of scale, too, by the least change of the others.
         """
         places, direction = [], 1.0 if forward else -1.0
         for column in columns:
@@ -335,6 +343,8 @@ class FreeRunProblem:
             elif is_damping and coarse:
                 # Only in coarse stages: the optimum itself is sought with the fine step.
                 step *= _TOLERANCES_OF_DAMPING
+            if most is not None:
+                step = min(step, float(most[column]))
             moved = theta.copy()
             step *= direction
             physical = self.centres[column] + (theta[column] + step) * self.scales[column]
@@ -348,6 +358,8 @@ class FreeRunProblem:
             for place, (_, by_run) in zip(places, changed, strict=True)
             for chosen in by_run
         ]
+        scalings = self._small_changes_of_scale(theta, direction) if len(columns) == theta.size else []
+        parts += [(run, self.values(theta + scaling)) for scaling in scalings for run in self.runs]
         residuals = self._weighted(parts)
         derivatives = []
         for place, column, (blocks, _) in zip(places, columns, changed, strict=True):
@@ -359,9 +371,49 @@ class FreeRunProblem:
             # A parameter whose simulation fails has no derivative, and the step does not use it.
             good = all(np.isfinite(derivative).all() for derivative in found.values())
             derivatives.append(found if good else {})
-        return BlockJacobian.of_blocks(
+        jacobian = BlockJacobian.of_blocks(
             derivatives, [observation.spectra.size for run in self.runs for observation in run]
         )
+        if scalings:
+            changes = np.concatenate(list(residuals)).reshape(len(scalings), -1) - at
+            runs = np.isfinite(changes).all(axis=1)
+            jacobian.correct(np.array(scalings)[runs].T, changes[runs].T)
+        return jacobian
+
+    def changes_of_scale(self, theta: FloatArray) -> list[FloatArray]:
+        """Directions in which all numbers grow as the unit of mass, or that of length, becomes smaller.
+
+        All motions and forces grow in proportion, and readings stay as they are where gains are free. One by one
+        these numbers change the motion much, and rough where friction and contacts jump: what such columns of a
+        Jacobian say of their sum is roughness.
+
+        Parameters
+        ----------
+        theta : ndarray
+
+        Returns
+        -------
+        list of ndarray, shape of theta
+            Each by one tolerance of the baseline's number that is known best; those that change two numbers.
+        """
+        values, found = self.centres / self.scales + theta, []
+        for powers in self._powers.T:
+            direction = powers * values
+            largest = np.abs(direction[: self.n_baseline]).max(initial=0.0)
+            if largest > 0 and np.count_nonzero(direction) > 1:
+                found.append(direction / largest)
+        return found
+
+    def _small_changes_of_scale(self, theta: FloatArray, sign: float) -> list[FloatArray]:
+        """As wide as a finite difference, or opposite where a number would leave its bounds; none at both ends."""
+        low, high = ((bounds - self.centres) / self.scales - theta for bounds in (self.low, self.high))
+        found = []
+        for direction in self.changes_of_scale(theta):
+            for step in (sign * _STEP * direction, -sign * _STEP * direction):
+                if np.all((step == 0) | (low <= step) & (step <= high)):
+                    found.append(step)
+                    break
+        return found
 
     def central_jacobian(self, theta: FloatArray) -> BlockJacobian:
         """Derivatives by all scaled parameters, by central differences: for a covariance.
@@ -521,13 +573,21 @@ def _of_baseline(known: BaselineParameter) -> _Number:
         (known.channel,) if known.channel else (),
         known.is_reading,
         known.is_damping,
+        known.dimension or dimension_of(known.units),
     )
 
 
 def _of_effect(candidate: Candidate, driving: Collection[str]) -> list[_Number]:
-    channels = _only_channels(candidate, driving)
+    channels, is_sensor = _only_channels(candidate, driving), candidate.effect.block == "sensor"
     return [
-        _Number(name, 0.0, candidate.scale(known.name), *candidate.bounds(known), channels)
+        _Number(
+            name,
+            0.0,
+            candidate.scale(known.name),
+            *candidate.bounds(known),
+            channels,
+            dimension=DIMENSIONLESS if is_sensor else dimension_of(named_and_units(known.name)[1]),
+        )
         for name, known in candidate.names.items()
     ]
 

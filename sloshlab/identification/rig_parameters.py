@@ -11,6 +11,7 @@ import numpy as np
 from sloshlab.identification.baseline_parameter import BaselineParameter
 from sloshlab.identification.case import CaseRun
 from sloshlab.identification.release import INSTANT, averaging_of_recorder, instant_s, tolerance_s
+from sloshlab.missing_physics.units import Dimension, dimension_of, named_and_units
 from sloshlab.twin.structure import Structure
 from sloshlab.twin.terms import Term
 from sloshlab.twin.twin import Twin
@@ -28,6 +29,7 @@ _TOLERANCE_OF_SHAPE: Final = 0.01
 
 Mode shapes as constants made cross talk out of such errors.
 """
+_MASS: Final = Dimension(mass=1.0)
 _TUNED_NUMBERS: Final = ("damping_n_s_per_m", "damping_kg_per_s", "force_n", "stiffness_n_per_m")
 
 
@@ -74,13 +76,18 @@ def rig_parameters(
             # A force that is zero in the rig file is absent, and a tolerance of 20 % of zero would be none.
             if name in _TUNED_NUMBERS and value:
                 number = f"{term.name}.{name}"
-                found.append(BaselineParameter(number, value, 0.2 * abs(value), most_above=_CLOSE_TOLERANCES))
+                tolerance, of_units = 0.2 * abs(value), dimension_of(named_and_units(name)[1])
+                found.append(
+                    BaselineParameter(number, value, tolerance, most_above=_CLOSE_TOLERANCES, dimension=of_units)
+                )
     names = sorted({name for each in runs for name in each.compared})
     # Without a measured force nothing tells the carried mass from the modal masses.
     if any(name.startswith("force") for name in names):
-        found.append(BaselineParameter("carried mass", 1.0, 0.01))
+        found.append(BaselineParameter("carried mass", 1.0, 0.01, dimension=_MASS))
     scaling = {name for each in runs for name in each.scaling}
-    found += _sensor_parameters(sorted({*names, *scaling}), scaling)
+    units = {name: str(each.run.recording[name].attrs["units"]) for each in runs for name in each.compared}
+    units |= {name: str(each.run.recording[name].attrs["units"]) for each in runs for name in each.scaling}
+    found += _sensor_parameters(units, scaling)
     found += [
         BaselineParameter(shape, 0.0, _TOLERANCE_OF_SHAPE, is_reading=True, channel=name)
         for name, of_channel in shapes.items()
@@ -91,12 +98,13 @@ def rig_parameters(
     return (*found, *(parameter for each in runs for parameter in _run_parameters(each)))
 
 
-def _sensor_parameters(names: Sequence[str], scaling: set[str]) -> list[BaselineParameter]:
-    """Gains, and shares of the force cells.
+def _sensor_parameters(units: Mapping[str, str], scaling: set[str]) -> list[BaselineParameter]:
+    """Gains, and shares of the force cells, by the units of all channels.
 
     Several accelerometers drive the tank by their mean, over the mean of their gains: these gains change the
     motion, and so does that of the one at the root. For a base at rest it has none, as nothing tells it.
     """
+    names = sorted(units)
     cells = cells_of(names)
     return [
         *(
@@ -108,6 +116,8 @@ def _sensor_parameters(names: Sequence[str], scaling: set[str]) -> list[Baseline
                 most_below=_CLOSE_TOLERANCES,
                 most_above=_CLOSE_TOLERANCES,
                 channel="" if name in scaling else name,
+                # A reading over what moves and acts.
+                dimension=dimension_of(units[name]).to_the(-1.0),
             )
             for name in names
             if not name.endswith("_root") or name in scaling
@@ -159,7 +169,7 @@ def _structure_parameters(structure: Structure, *, moves: bool) -> list[Baseline
         found.append(BaselineParameter(f"frequency of {label}", 1.0, 0.02))
         damping = f"damping of {label}"
         found.append(BaselineParameter(damping, 1.0, 0.2, most_above=_CLOSE_TOLERANCES, is_damping=True))
-    found += [BaselineParameter(f"modal mass of mode {i + 1}", 1.0, 0.01) for i in range(n)]
+    found += [BaselineParameter(f"modal mass of mode {i + 1}", 1.0, 0.01, dimension=_MASS) for i in range(n)]
     if moves:
         found += [
             BaselineParameter(

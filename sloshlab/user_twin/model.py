@@ -18,6 +18,7 @@ from sloshlab.identification.diagnosed_model import Readings, Request
 from sloshlab.identification.rig_model import corrected
 from sloshlab.missing_physics.candidate import Candidate
 from sloshlab.missing_physics.extension import NOTHING, ActingDrive, Extension, SensorFault, with_acting
+from sloshlab.missing_physics.units import dimension_of
 from sloshlab.recording import channels
 from sloshlab.twin.lane_preparation import IN_TURN, Executor
 from sloshlab.twin.terms import Term
@@ -260,7 +261,15 @@ class UserTwinModel:
             ]
         for name, shown in self._shown.items():
             if shown.gain_tolerance:
-                found.append(BaselineParameter(f"gain of {name}", 1.0, shown.gain_tolerance, is_reading=True))
+                found.append(
+                    BaselineParameter(
+                        f"gain of {name}",
+                        1.0,
+                        shown.gain_tolerance,
+                        is_reading=True,
+                        dimension=dimension_of(shown.units).to_the(-1.0),
+                    )
+                )
             if shown.offset_tolerance:
                 found += [
                     BaselineParameter(
