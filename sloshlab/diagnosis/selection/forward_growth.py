@@ -12,10 +12,10 @@ from sloshlab.diagnosis.selection.known_fits import N_KEPT, KnownFits
 from sloshlab.diagnosis.selection.matched_forces import MatchedForces, matched_forces
 from sloshlab.diagnosis.selection.nested_models import keys_of
 from sloshlab.diagnosis.selection.proposals import NO_STARTS, Base, most_promising, proposals
-from sloshlab.diagnosis.selection.successive_halving import HOPELESS_COST_RATIO, halved
-from sloshlab.identification.free_run_fit import stages_for
-from sloshlab.identification.free_run_problem import FreeRunFit
-from sloshlab.missing_physics.candidate import Candidate, Surroundings, candidates, extension_of
+from sloshlab.diagnosis.selection.successive_halving import HOPELESS_COST_RATIO, STEPS_OF_A_RUNG, halved
+from sloshlab.identification.free_run_fit import fitted, inflated_cost, stages_for
+from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem
+from sloshlab.missing_physics.candidate import Candidate, Numbers, Surroundings, candidates, extension_of
 
 Said = Callable[[str, int, int], None]
 """Told what is being done, how much of it is done, and how much there is."""
@@ -206,7 +206,7 @@ class ForwardGrowth:
 
     def _leaving_nothing(self, best: FreeRunFit, matched: MatchedForces) -> Candidate | None:
         """The first of the leading forces that leaves nothing beside a fit; those before it are kept, too."""
-        for candidate, numbers in matched.leading:
+        for candidate, numbers in self._as_they_simulate(best, matched.leading):
             self._say_fitting((*best.candidates, candidate))
             fit = compensated_fit(
                 self.known.runs,
@@ -220,6 +220,34 @@ class ForwardGrowth:
             if not fit.trouble and not self.known.remains(fit):
                 return candidate
         return None
+
+    def _as_they_simulate(
+        self, best: FreeRunFit, leading: Sequence[tuple[Candidate, Numbers]]
+    ) -> list[tuple[Candidate, Numbers]]:
+        """First what leaves least after a few steps of all other numbers, or the simplest form it reduces to.
+
+        A force with memory can match along a motion what it would never make of that motion.
+        """
+        if len(leading) < 2:
+            return list(leading)
+        few, inflation = self.known.runs.one_repeat_per_test, self._stages(best)[0]
+
+        def cost(of: tuple[Candidate, Numbers]) -> float:
+            candidate, numbers = of
+            beside = FreeRunProblem(few.model, few.runs, (*best.candidates, candidate), numbers, few.effort)
+            start = {**best.values, **numbers}
+            fit, _ = fitted(beside, start, n_iterations=STEPS_OF_A_RUNG, stages=(inflation,), is_last=False)
+            return np.inf if fit.trouble else inflated_cost(beside, fit, inflation)
+
+        costs = few.effort.spent_on(few.model.executor, cost, leading)
+        left = {candidate.key: each for (candidate, _), each in zip(leading, costs, strict=True)}
+
+        def rank(of: tuple[Candidate, Numbers]) -> tuple[float, int]:
+            [candidate, _] = of
+            forms = [other.key for other, _ in leading if other is candidate or other.reduces_to(candidate)]
+            return min(left[key] for key in forms), len(candidate.names)
+
+        return sorted(leading, key=rank)
 
     def _say_fitting(self, model: Sequence[Candidate]) -> None:
         self.said(f"fitting {' + '.join(candidate.key for candidate in model)}", 0, 1)

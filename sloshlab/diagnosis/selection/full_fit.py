@@ -104,8 +104,11 @@ def compensated_fit(
     believed = {name: value for name, value in runs.model.believed.items() if not beside.owner(name)}
 
     def compensated(start: Mapping[str, float]) -> FreeRunFit:
-        begun = beside.values(beside.theta_of({**start, **numbers}))
-        return replace(at_its_optimum(beside, begun, hopeless_cost), candidates=())
+        begun = FreeRunFit(beside.candidates, beside.values(beside.theta_of({**start, **numbers})), 0.0, 0.0)
+        # Numbers that match are known too coarsely for what shows in the noise alone.
+        stages = stages_for(beside, begun)
+        found = at_its_optimum(beside, begun.values, hopeless_cost, stages[:-1] or stages)
+        return replace(found, candidates=())
 
     starts = [base.values, {**base.values, **believed}]
     fits = list(runs.effort.spent_on(runs.model.executor, compensated, starts))

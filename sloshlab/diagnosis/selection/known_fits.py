@@ -303,8 +303,9 @@ class KnownFits:
         self._refit_leading()
 
     def _refit_leading(self) -> None:
-        """The leading fits at their optima in the noise as it is now, from where they are."""
-        runs, leading = self.runs, self.leading(len(self.best.candidates))
+        """Fits that may win at their optima in the noise as it is now, from where they are."""
+        runs, best = self.runs, self.of_length(len(self.best.candidates))[:N_KEPT]
+        leading = [fit for fit in best if self.may_win(fit)]
 
         def refitted(fit: FreeRunFit) -> FreeRunFit:
             return replace(at_its_optimum(runs.problem_of(fit), fit.values, stages=(0.0,)), candidates=())

@@ -9,6 +9,7 @@ import numpy as np
 
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
 from sloshlab.diagnosis.selection.known_fits import LEAST_EXPLAINED
+from sloshlab.diagnosis.selection.nested_models import reduced
 from sloshlab.diagnosis.selection.proposals import Places, missing_from
 from sloshlab.diagnosis.selection.successive_halving import HOPELESS_COST_RATIO, N_ALIKE
 from sloshlab.identification.free_run_problem import FreeRunFit
@@ -111,7 +112,7 @@ class _Matches:
                 for key, matches in self.of.items()
             },
             {candidate.key: self.least(candidate) for candidate in self.candidates if self.is_compared(candidate)},
-            [(candidate, self.of[candidate.key][0].numbers) for candidate in sorted(leading, key=self.rank_of)],
+            [(candidate, self.numbers(candidate)) for candidate in sorted(leading, key=self.rank_of)],
             self,
         )
 
@@ -154,8 +155,18 @@ class _Matches:
         Noise of a recorded velocity has either sign where a place sticks. It makes dry friction jump there, but
         not the spring behind a play, which is dry friction all the same where it is stiff.
         """
+        return self.left(self._told_by(candidate))
+
+    def numbers(self, candidate: Candidate) -> dict[str, float]:
+        """Its best match, or what is left of the best match of a form that reduces to it and leaves less."""
+        teller = self._told_by(candidate)
+        found = self.of[teller.key][0].numbers
+        return found if teller is candidate else reduced(FreeRunFit((teller,), found, 0.0, 0.0), teller, candidate)
+
+    def _told_by(self, candidate: Candidate) -> Candidate:
+        """What leaves least of it and the forms that reduce to it."""
         wider = [other for other in self.candidates if other.reduces_to(candidate)]
-        return min(map(self.left, (candidate, *wider)))
+        return min((candidate, *wider), key=self.left)
 
     def rank_of(self, candidate: Candidate) -> tuple[float, int]:
         """For an order in which of two forms that may leave the same the one with fewer numbers comes first."""
@@ -168,8 +179,8 @@ class _Matches:
         return sorted((candidate for candidate in matched if self.least(candidate) <= most), key=self.rank_of)
 
     def explains(self, candidate: Candidate) -> bool:
-        """Whether it explains some of what is missing at its place."""
-        matches = self.of.get(candidate.key)
+        """Whether it, or a form that reduces to it, explains some of what is missing at its place."""
+        matches = self.of.get(self._told_by(candidate).key)
         return matches is not None and matches[0].misfit < 1.0 - LEAST_EXPLAINED
 
     def is_compared(self, candidate: Candidate) -> bool:

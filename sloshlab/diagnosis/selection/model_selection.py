@@ -236,17 +236,15 @@ class ModelSelection:
     def _simpler_forms(self, model: FreeRunFit, effect: Candidate) -> list[FreeRunFit]:
         """A model with what an effect reduces to in its place, from its numbers.
 
-        Again where the known fit is far behind: friction has local minima, and the wider form tells where that one
-        should have ended.
+        Again where one is known: friction has local minima, and the wider form tells where that one should have
+        ended.
         """
         rest = without(model, effect)
         begun = []
         for simpler in self.growth.pool:
             if effect.reduces_to(simpler):
-                known = self.known.of_model(keys_of((*rest.candidates, simpler)))
-                if known is None or not self.known.may_win(known):
-                    values = {**rest.values, **reduced(model, effect, simpler)}
-                    begun.append(FreeRunFit((*rest.candidates, simpler), values, 0.0, 0.0))
+                values = {**rest.values, **reduced(model, effect, simpler)}
+                begun.append(FreeRunFit((*rest.candidates, simpler), values, 0.0, 0.0))
         return begun
 
     def _refined(self, best: FreeRunFit) -> None:
