@@ -21,6 +21,7 @@ from sloshlab.identification.free_run_fit import fitted_baseline
 from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.identification.noise_floor import weighted_observations
 from sloshlab.identification.rig_model import RigModel
+from sloshlab.missing_force.force_matching import Match
 from sloshlab.missing_physics import effects
 from sloshlab.missing_physics.candidate import Candidate, candidates
 
@@ -169,4 +170,61 @@ def test_a_limit_of_a_form_that_matches_is_not_passed_over(search: tuple[ModelSe
         "coulomb_friction",
         "friction_behind_play",
         "quadratic_drag",
+    ]
+
+
+def test_a_limit_begins_where_the_form_matches_that_leaves_less(search: tuple[ModelSelection, FreeRunFit]) -> None:
+    """Noise has spoilt its own match, which explains nothing."""
+    selection, _ = search
+    numbers = {
+        "structure.friction_behind_play": {"force_n": 2.0, "stiffness_n_per_m": 4e4, "play_m": 1e-4},
+        "structure.coulomb_friction": {"force_n": 9.0},
+    }
+    pool = [candidate for candidate in candidates(selection.growth.at) if candidate.key in numbers]
+    behind_play, friction = sorted(pool, key=lambda candidate: len(candidate.names), reverse=True)
+
+    class Matches(module._Matches):
+        def __init__(self, misfit_of_friction: float) -> None:
+            misfits = {behind_play.key: 0.1, friction.key: misfit_of_friction}
+            self.candidates = pool
+            self.of = {
+                key: [Match(misfit, {f"{key}.{name}": value for name, value in numbers[key].items()})]
+                for key, misfit in misfits.items()
+            }
+
+        def left(self, candidate: Candidate) -> float:
+            return self.of[candidate.key][0].misfit
+
+    spoilt, better = Matches(1.0), Matches(0.05)
+    assert spoilt.explains(friction)
+    assert spoilt.numbers(friction) == {"structure.coulomb_friction.force_n": 2.0}
+    assert better.numbers(friction) == {"structure.coulomb_friction.force_n": 9.0}
+    assert spoilt.numbers(behind_play) == spoilt.of[behind_play.key][0].numbers
+
+
+def test_forces_are_fitted_in_the_order_of_what_they_leave_in_a_simulation(
+    search: tuple[ModelSelection, FreeRunFit], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A loop that matches best along the motion leaves most of it; a limit comes before the form it is one of."""
+    selection, retuned = search
+    left = {
+        "structure.hysteresis": 300.0,
+        "structure.friction_behind_play": 100.0,
+        "structure.coulomb_friction": 400.0,
+    }
+    pool = {candidate.key: candidate for candidate in candidates(selection.growth.at)}
+    leading = [(pool[key], pool[key].starts()[0]) for key in left]
+    monkeypatch.setattr(
+        forward_growth,
+        "fitted",
+        lambda problem, start, **how: (FreeRunFit(problem.candidates, dict(start), 0.0, 0.0), None),
+    )
+    monkeypatch.setattr(
+        forward_growth, "inflated_cost", lambda problem, fit, inflation: left[fit.candidates[-1].key]
+    )
+    found = selection.growth._as_they_simulate(retuned, leading)
+    assert [candidate.effect.name for candidate, _ in found] == [
+        "coulomb_friction",
+        "friction_behind_play",
+        "hysteresis",
     ]

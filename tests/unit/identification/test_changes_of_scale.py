@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -132,3 +133,53 @@ def test_friction_and_masses_that_are_off_in_proportion_come_back(of_friction: F
     found, _ = fitted(problem, off, stages=(0.0,))
     assert found.cost - best.cost < 1.0
     assert found.values[FRICTION] == pytest.approx(FRICTION_N, rel=0.01)
+
+
+def test_differences_at_the_optimum_change_the_cost_by_what_the_end_of_a_fit_neglects(
+    of_friction: FreeRunProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A thirtieth of a thousandth; those with which fits of friction ended change it far more."""
+    problem, asked = of_friction, list[tuple[np.ndarray, np.ndarray]]()
+    original = FreeRunProblem.jacobian
+
+    def recorded(self: FreeRunProblem, theta: np.ndarray, *others: object, **how: object) -> BlockJacobian:
+        if how.get("most") is not None:
+            asked.append((theta.copy(), np.asarray(how["most"])))
+        return original(self, theta, *others, **how)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(FreeRunProblem, "jacobian", recorded)
+    fitted(problem, {**problem.model.believed, FRICTION: 0.9 * FRICTION_N}, stages=(0.03, 0.0))
+    theta, most = asked[0]
+    at = problem.residual(theta)
+    neglected = 3e-5 * (problem.misfit(at) + problem.prior_cost(theta))
+    stiff = [problem.names.index(name) for name in ("frequency of mode 1", FRICTION)]
+    for i in stiff:
+        moved = theta.copy()
+        moved[i] += most[i]
+        assert neglected / 4 < np.sum((problem.residual(moved) - at) ** 2) < 4 * neglected
+        moved[i] = theta[i] + 0.005
+        assert np.sum((problem.residual(moved) - at) ** 2) > 10 * neglected
+
+
+def test_a_fit_whose_steps_shrink_slowly_makes_its_derivatives_anew(
+    of_friction: FreeRunProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With slopes five times too large every step succeeds, and is a fifth of what it should be."""
+    problem, made = of_friction, list[str]()
+    theta = problem.theta_of({**problem.model.believed, FRICTION: FRICTION_N})
+    theta[: problem.n_baseline] += 0.3 * problem.changes_motion
+    right = problem.jacobian(theta, problem.residual(theta), range(theta.size))
+    too_large = [5.0 * right.times(unit) for unit in np.eye(theta.size)]
+    known = BlockJacobian.of_columns(too_large, [each.spectra.size for run in problem.runs for each in run])
+    for name in ("jacobian", "residual"):
+        original = getattr(FreeRunProblem, name)
+
+        def noted(
+            self: FreeRunProblem, *of: object, name: str = name, original: Any = original, **how: object
+        ) -> object:
+            made.append(name)
+            return original(self, *of, **how)
+
+        monkeypatch.setattr(FreeRunProblem, name, noted)
+    fitted(problem, problem.values(theta), stages=(0.0,), n_iterations=10, known=known)
+    assert made.index("jacobian") <= 4
