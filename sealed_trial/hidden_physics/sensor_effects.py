@@ -160,7 +160,10 @@ def cross_talk(scales: Scales, generator: np.random.Generator) -> DrawnEffect:
 
         return Change({"ratio": m * unit}, distortion=distort)
 
-    return DrawnEffect("cross_talk", "sensor", change, channel, most=8.0)
+    # A small part of a reading leaks, or of the source into a base at rest; more is a wrong connection.
+    own = scales.rms[channel] / max(scales.rms[source], 1e-300)
+    largest = 0.1 * max(own, 1.0) if channel == "acceleration_root" else 0.2 * own
+    return DrawnEffect("cross_talk", "sensor", change, channel, most=min(8.0, largest / unit))
 
 
 def hold(scales: Scales, generator: np.random.Generator) -> DrawnEffect:

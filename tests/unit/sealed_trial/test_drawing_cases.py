@@ -12,7 +12,7 @@ from sealed_trial import case_drawing
 from sealed_trial.case_drawing import CaseDrawing, _motion, _require_within_noise, _scaled, class_order
 from sealed_trial.composition import SINGLES, class_sizes, possible
 from sealed_trial.hidden_physics.effect import Change, DrawnEffect, Scales
-from sealed_trial.hidden_physics.sensor_effects import gain
+from sealed_trial.hidden_physics.sensor_effects import cross_talk, gain
 from sealed_trial.hidden_physics.structure_effects import asymmetric
 from sealed_trial.hidden_physics.unknown_physics import UNKNOWN_PHYSICS
 from sealed_trial.laboratory.hidden_rig import drawn_rig, rig_text, wrongly_believed
@@ -155,6 +155,21 @@ def scales() -> Scales:
 def test_a_gain_is_never_that_of_a_force_which_a_mass_would_change_alike() -> None:
     drawn = {gain(scales(), np.random.default_rng(k)).channel for k in range(60)}
     assert drawn == {"acceleration_control", "acceleration_roof_1"}
+
+
+@pytest.mark.parametrize("moving_g", [0.0, 0.02, 1.0, 30.0])
+def test_no_more_leaks_from_one_accelerometer_to_another_than_cables_let(moving_g: float) -> None:
+    """A fifth of a reading, or a tenth of the source into a base at rest."""
+    rms = {"acceleration_root": moving_g, "acceleration_tip": 1.0}
+    signals = {name: np.full(4, value) for name, value in rms.items()}
+    for seed in range(12):
+        drawn = cross_talk(replace(scales(), rms=rms), np.random.default_rng(seed))
+        change = drawn.change(drawn.most)
+        assert change.distortion is not None
+        leaked = float(abs(change.distortion(signals, 500.0, 0)[drawn.channel] - signals[drawn.channel]).max())
+        own, rests = rms[drawn.channel], drawn.channel == "acceleration_root"
+        assert leaked <= max(0.2 * own, 0.1 if rests else 0.0) * (1 + 1e-9)
+        assert leaked > 0.0
 
 
 def test_what_makes_friction_asymmetric_is_half_of_what_it_differs_by() -> None:
