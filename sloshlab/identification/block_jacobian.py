@@ -193,7 +193,7 @@ class BlockJacobian:
         Parameters
         ----------
         steps : ndarray, shape (n_columns,) or (n_columns, n)
-            Linearly independent; of those that are equal in the columns of a block none is reproduced there.
+            Of those that a block cannot tell apart it reproduces the mean.
         changes : ndarray, shape (n_rows,) or (n_rows, n)
             Of the residuals by each step.
 
@@ -216,4 +216,4 @@ class BlockJacobian:
                 # Each block divides by the length of its own part of the step: the update of Schubert, row by
                 # row the least change that leaves zeros alone. Broyden's update would fill them.
                 missed = changes[block.rows] - block.values @ own
-                block.values[...] += missed @ np.linalg.pinv(own)
+                block.values[...] += missed @ (np.linalg.pinv(own.T @ own, hermitian=True) @ own.T)

@@ -145,6 +145,23 @@ def test_steps_along_every_column_make_the_matrix_of_a_linear_problem() -> None:
     np.testing.assert_allclose(as_dense(jacobian), matrix, rtol=1e-13, atol=1e-15)
 
 
+def test_a_correction_by_several_steps_says_all_that_was_seen() -> None:
+    """One after the other they would spoil each other; of two that a block cannot tell apart it takes the mean."""
+    generator = np.random.default_rng(5)
+    steps, changes = generator.normal(size=(4, 2)), generator.normal(size=(sum(SIZES), 2))
+    jacobian = in_blocks(dense(3))
+    jacobian.correct(steps, changes)
+    found = as_dense(jacobian)
+    seen = np.repeat(PATTERN, SIZES, axis=0).astype(bool)
+    tell = seen.sum(axis=1) > 1
+    assert tell.any()
+    np.testing.assert_allclose((found @ steps)[tell], changes[tell], rtol=1e-10)
+    assert not found[~seen].any()
+    twice = in_blocks(dense(3))
+    twice.correct(steps[:, [0, 0]], changes)
+    np.testing.assert_allclose(as_dense(twice) @ steps[:, 0], changes.mean(axis=1), rtol=1e-10)
+
+
 @pytest.mark.parametrize("scale", [1e-8, 1e8])
 def test_a_correction_does_not_depend_on_the_units_of_the_residuals(scale: float) -> None:
     matrix, step = dense(8), np.array([0.3, -1.0, 0.7, 0.2])
