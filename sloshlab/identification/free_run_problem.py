@@ -394,7 +394,8 @@ class FreeRunProblem:
         Returns
         -------
         list of ndarray, shape of theta
-            Each by one tolerance of the baseline's number that is known best; those that change two numbers.
+            Each by one tolerance of the baseline's number that is known best; those that change two numbers, and
+            one where both units change the same numbers alike.
         """
         values, found = self.centres / self.scales + theta, []
         for powers in self._powers.T:
@@ -402,7 +403,7 @@ class FreeRunProblem:
             largest = np.abs(direction[: self.n_baseline]).max(initial=0.0)
             if largest > 0 and np.count_nonzero(direction) > 1:
                 found.append(direction / largest)
-        return found
+        return found[: np.linalg.matrix_rank(np.stack(found))] if found else []
 
     def _small_changes_of_scale(self, theta: FloatArray, sign: float) -> list[FloatArray]:
         """As wide as a finite difference, or opposite where a number would leave its bounds; none at both ends."""

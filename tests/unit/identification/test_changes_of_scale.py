@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from recorded_oscillators import decays, effect, rig, surroundings
+from recorded_oscillators import MASS_KG, decays, driven, effect, rig, surroundings
 
 from sloshlab.identification.block_jacobian import BlockJacobian
 from sloshlab.identification.free_run_fit import _metric, fitted
@@ -28,6 +28,11 @@ def problem_of(folder: Path, keys: Sequence[str], **physics: object) -> FreeRunP
     model = RigModel(rig(folder), folder, decays(**physics))  # type: ignore[arg-type]
     chosen = [Candidate(effect(key), surroundings(model), "") for key in keys]
     return FreeRunProblem(model, [observations(run, model.compared(run)) for run in model.runs], chosen)
+
+
+def with_force(channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """A force cell below the whole mass."""
+    return {**channels, "force_interface": -MASS_KG * channels["acceleration_tip"]}
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +78,20 @@ def test_a_scale_that_no_gain_is_free_to_take_is_none(of_friction: FreeRunProble
     held = {name: value for name, value in of_friction.model.believed.items() if name != MASS}
     problem = FreeRunProblem(of_friction.model, of_friction.runs, [], held)
     assert problem.changes_of_scale(np.zeros(1)) == []
+
+
+def test_units_that_change_the_same_numbers_alike_count_once(tmp_path: Path) -> None:
+    """Only forces are free: a force is a mass times a length."""
+    model = RigModel(rig(tmp_path), tmp_path, driven(changed=with_force))
+    candidate = Candidate(effect("structure.coulomb_friction"), surroundings(model), "")
+    held = {name: value for name, value in model.believed.items() if name != "gain of force_interface"}
+    observed = [observations(run, model.compared(run)) for run in model.runs]
+    problem = FreeRunProblem(model, observed, [candidate], held)
+    theta = problem.theta_of({FRICTION: FRICTION_N})
+    [direction] = problem.changes_of_scale(theta)
+    np.testing.assert_allclose(np.abs(direction), [1.0, 0.01 * FRICTION_N / problem.scales[1]])
+    fit, _ = fitted(problem, problem.values(theta), stages=(0.0,))
+    assert np.isfinite(list(fit.values.values())).all()
 
 
 def test_differences_are_as_narrow_as_is_asked(of_friction: FreeRunProblem) -> None:
