@@ -332,26 +332,8 @@ class FreeRunProblem:
 
         Those by all parameters are right along changes of scale, too, by the least change of the others.
         """
-        places, direction = [], 1.0 if forward else -1.0
-        for column in columns:
-            is_effect, is_damping = column >= self.n_baseline, self._is_damping[column]
-            step = _COARSE_STEP if coarse and (is_effect or is_damping) else _STEP
-            if is_effect:
-                # Relative to the parameter, which may have moved far from the start that scales it; an effect of
-                # size nothing still needs a step.
-                step *= max(abs(theta[column]), 0.05)
-            elif is_damping and coarse:
-                # Only in coarse stages: the optimum itself is sought with the fine step.
-                step *= _TOLERANCES_OF_DAMPING
-            if most is not None:
-                step = min(step, float(most[column]))
-            moved = theta.copy()
-            step *= direction
-            physical = self.centres[column] + (theta[column] + step) * self.scales[column]
-            # Away from the bound, where the values would be clipped and the difference zero.
-            moved[column] += step if self.low[column] <= physical <= self.high[column] else -step
-            places.append(moved)
-
+        direction = 1.0 if forward else -1.0
+        places = [self._moved(theta, column, direction, coarse=coarse, most=most) for column in columns]
         changed = [self._changed_by([column]) for column in columns]
         parts = [
             (chosen, self.values(place))
@@ -379,6 +361,26 @@ class FreeRunProblem:
             runs = np.isfinite(changes).all(axis=1)
             jacobian.correct(np.array(scalings)[runs].T, changes[runs].T)
         return jacobian
+
+    def _moved(
+        self, theta: FloatArray, column: int, direction: float, *, coarse: bool, most: FloatArray | None
+    ) -> FloatArray:
+        """Parameters of which one is moved by a finite difference."""
+        is_effect, is_damping = column >= self.n_baseline, self._is_damping[column]
+        step = _COARSE_STEP if coarse and (is_effect or is_damping) else _STEP
+        if is_effect:
+            # Relative to the parameter, which may have moved far from the start that scales it; an effect of size
+            # nothing still needs a step.
+            step *= max(abs(theta[column]), 0.05)
+        elif is_damping and coarse:
+            # Only in coarse stages: the optimum itself is sought with the fine step.
+            step *= _TOLERANCES_OF_DAMPING
+        step = direction * (step if most is None else min(step, float(most[column])))
+        physical = self.centres[column] + (theta[column] + step) * self.scales[column]
+        moved = theta.copy()
+        # Away from the bound, where the values would be clipped and the difference zero.
+        moved[column] += step if self.low[column] <= physical <= self.high[column] else -step
+        return moved
 
     def changes_of_scale(self, theta: FloatArray) -> list[FloatArray]:
         """Directions in which all numbers grow as the unit of mass, or that of length, becomes smaller.
