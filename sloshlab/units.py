@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+import re
+from dataclasses import dataclass
 from typing import Annotated, Final
 
 from sloshlab.errors import UnitsError
@@ -78,6 +80,49 @@ in UDUNITS 'g' is the gram; a force in gram-force is 'gf', an acceleration in g 
     if source.convert(0.0, si) != 0.0:
         raise UnitsError(what, got=repr(units), allowed="units without an offset", remedy=remedy)
     return float(source.convert(1.0, si))
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """Powers of mass and length in the dimension of a number; that of time has no use here."""
+
+    mass: int = 0
+    length: int = 0
+
+    def inverse(self) -> Dimension:
+        """Of one over the number."""
+        return Dimension(-self.mass, -self.length)
+
+
+DIMENSIONLESS: Final = Dimension()
+
+
+@functools.lru_cache(maxsize=256)
+def dimension_of(units: str) -> Dimension:
+    """Dimension of a number of some units; none of what UDUNITS does not know.
+
+    Parameters
+    ----------
+    units : str
+        UDUNITS text; ``"g"`` is that of an acceleration, as in the names of numbers.
+
+    Examples
+    --------
+    >>> dimension_of("N s m-1"), dimension_of("N s²/m²")
+    (Dimension(mass=1, length=0), Dimension(mass=1, length=-1))
+    >>> dimension_of("rad/(N m)"), dimension_of("g"), dimension_of("1")
+    (Dimension(mass=-1, length=-2), Dimension(mass=0, length=1), Dimension(mass=0, length=0))
+    """
+    import cf_units
+
+    if len(units) > _LONGEST_UNITS:
+        return DIMENSIONLESS
+    try:
+        base_units = str(cf_units.Unit("gravity" if units == "g" else units).definition)
+    except ValueError:
+        return DIMENSIONLESS
+    powers = {unit: int(power or 1) for unit, power in re.findall(r"\b(kg|m)(-?\d+)?(?=\.|$)", base_units)}
+    return Dimension(powers.get("kg", 0), powers.get("m", 0))
 
 
 def _article(noun: str) -> str:

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sloshlab.missing_physics.units import Dimension
+from sloshlab.units import Dimension
 
 FloatArray = NDArray[np.float64]
 _STANDARD_UNCERTAINTY: Final = 3**-0.5

@@ -20,7 +20,8 @@ from sloshlab.identification.observations import Observation
 from sloshlab.identification.owning_runs import owning_runs
 from sloshlab.missing_physics.candidate import Candidate, channels_of, extension_of
 from sloshlab.missing_physics.extension import Extension, left_out_of_drives
-from sloshlab.missing_physics.units import DIMENSIONLESS, Dimension, dimension_of, named_and_units
+from sloshlab.missing_physics.units import named_and_units
+from sloshlab.units import DIMENSIONLESS, Dimension, dimension_of
 
 FloatArray = NDArray[np.float64]
 _Label = TypeVar("_Label")

@@ -11,10 +11,11 @@ import numpy as np
 from sloshlab.identification.baseline_parameter import BaselineParameter
 from sloshlab.identification.case import CaseRun
 from sloshlab.identification.release import INSTANT, averaging_of_recorder, instant_s, tolerance_s
-from sloshlab.missing_physics.units import Dimension, dimension_of, named_and_units
+from sloshlab.missing_physics.units import named_and_units
 from sloshlab.twin.structure import Structure
 from sloshlab.twin.terms import Term
 from sloshlab.twin.twin import Twin
+from sloshlab.units import Dimension, dimension_of
 
 RELEASE: Final = "release of "
 FLUCTUATION: Final = "damping of the liquid in "
@@ -29,7 +30,7 @@ _TOLERANCE_OF_SHAPE: Final = 0.01
 
 Mode shapes as constants made cross talk out of such errors.
 """
-_MASS: Final = Dimension(mass=1.0)
+_MASS: Final = Dimension(mass=1)
 _TUNED_NUMBERS: Final = ("damping_n_s_per_m", "damping_kg_per_s", "force_n", "stiffness_n_per_m")
 
 
@@ -85,8 +86,11 @@ def rig_parameters(
     if any(name.startswith("force") for name in names):
         found.append(BaselineParameter("carried mass", 1.0, 0.01, dimension=_MASS))
     scaling = {name for each in runs for name in each.scaling}
-    units = {name: str(each.run.recording[name].attrs["units"]) for each in runs for name in each.compared}
-    units |= {name: str(each.run.recording[name].attrs["units"]) for each in runs for name in each.scaling}
+    units = {
+        name: str(each.run.recording[name].attrs["units"])
+        for each in runs
+        for name in (*each.compared, *each.scaling)
+    }
     found += _sensor_parameters(units, scaling)
     found += [
         BaselineParameter(shape, 0.0, _TOLERANCE_OF_SHAPE, is_reading=True, channel=name)
@@ -117,7 +121,7 @@ def _sensor_parameters(units: Mapping[str, str], scaling: set[str]) -> list[Base
                 most_above=_CLOSE_TOLERANCES,
                 channel="" if name in scaling else name,
                 # A reading over what moves and acts.
-                dimension=dimension_of(units[name]).to_the(-1.0),
+                dimension=dimension_of(units[name]).inverse(),
             )
             for name in names
             if not name.endswith("_root") or name in scaling

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass
 from typing import Final
 
 _UNITS: Final = (
@@ -31,38 +29,6 @@ _PEOPLE: Final = frozenset({"coulomb", "faraday", "stribeck"})
 """After whom effects are called."""
 
 
-@dataclass(frozen=True)
-class Dimension:
-    """Powers of mass and length in the dimension of a number; that of time has no use here."""
-
-    mass: float = 0.0
-    length: float = 0.0
-
-    def to_the(self, power: float) -> Dimension:
-        """Of a power of the number."""
-        return Dimension(power * self.mass, power * self.length)
-
-    def __add__(self, other: Dimension) -> Dimension:
-        """Of a product."""
-        return Dimension(self.mass + other.mass, self.length + other.length)
-
-
-DIMENSIONLESS: Final = Dimension()
-_DIMENSIONS: Final = {
-    "kg": Dimension(mass=1.0),
-    "m": Dimension(length=1.0),
-    "mm": Dimension(length=1.0),
-    "g": Dimension(length=1.0),
-    "N": Dimension(1.0, 1.0),
-    "kN": Dimension(1.0, 1.0),
-    "Pa": Dimension(1.0, -1.0),
-    "J": Dimension(1.0, 2.0),
-    "W": Dimension(1.0, 2.0),
-}
-"""Of units with a mass or a length; `g` is that of an acceleration."""
-_SUPERSCRIPTS: Final = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
-
-
 def in_words(name: str) -> str:
     """A name, or names joined, as a sentence has it.
 
@@ -83,29 +49,6 @@ def is_calibrated(parameter: str) -> bool:
     [True, True, False, False, False]
     """
     return parameter.partition(" in ")[0] in _OF_A_CHANNEL or named_and_units(parameter)[1] not in ("", "s", "Hz")
-
-
-def dimension_of(units: str) -> Dimension:
-    """Dimension of a number of some units; of unknown ones none.
-
-    Parameters
-    ----------
-    units : str
-        A product of powers, or a quotient of two.
-
-    Examples
-    --------
-    >>> dimension_of("N s m-1"), dimension_of("N s²/m²")
-    (Dimension(mass=1.0, length=0.0), Dimension(mass=1.0, length=-1.0))
-    >>> dimension_of("rad/(N m)"), dimension_of("1")
-    (Dimension(mass=-1.0, length=-2.0), Dimension(mass=0.0, length=0.0))
-    """
-    found = DIMENSIONLESS
-    over, _, under = units.translate(_SUPERSCRIPTS).partition("/")
-    for sign, product in ((1.0, over), (-1.0, under)):
-        for unit, power in re.findall(r"([A-Za-z]+)\^?(-?\d+)?", product):
-            found += _DIMENSIONS.get(unit, DIMENSIONLESS).to_the(sign * float(power or 1))
-    return found
 
 
 def named_and_units(parameter: str) -> tuple[str, str]:

@@ -18,12 +18,11 @@ from sloshlab.identification.diagnosed_model import Readings, Request
 from sloshlab.identification.rig_model import corrected
 from sloshlab.missing_physics.candidate import Candidate
 from sloshlab.missing_physics.extension import NOTHING, ActingDrive, Extension, SensorFault, with_acting
-from sloshlab.missing_physics.units import dimension_of
 from sloshlab.recording import channels
 from sloshlab.twin.lane_preparation import IN_TURN, Executor
 from sloshlab.twin.terms import Term
 from sloshlab.twin.twin import Twin
-from sloshlab.units import SI_UNITS
+from sloshlab.units import SI_UNITS, dimension_of
 from sloshlab.user_twin.description import Compared, EquationTwin, FreeTwin, Parameter, TwinRun, UserTwin
 from sloshlab.user_twin.extended import save_extended
 from sloshlab.user_twin.simulator import Asked, Truth, or_why_not
@@ -267,7 +266,7 @@ class UserTwinModel:
                         1.0,
                         shown.gain_tolerance,
                         is_reading=True,
-                        dimension=dimension_of(shown.units).to_the(-1.0),
+                        dimension=dimension_of(shown.units).inverse(),
                     )
                 )
             if shown.offset_tolerance:

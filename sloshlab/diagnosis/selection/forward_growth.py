@@ -206,7 +206,7 @@ class ForwardGrowth:
 
     def _leaving_nothing(self, best: FreeRunFit, matched: MatchedForces) -> Candidate | None:
         """The first of the leading forces that leaves nothing beside a fit; those before it are kept, too."""
-        for candidate, numbers in self._as_they_simulate(best, matched.leading):
+        for candidate, numbers in self._in_order_of_simulation(best, matched.leading):
             self._say_fitting((*best.candidates, candidate))
             fit = compensated_fit(
                 self.known.runs,
@@ -221,7 +221,7 @@ class ForwardGrowth:
                 return candidate
         return None
 
-    def _as_they_simulate(
+    def _in_order_of_simulation(
         self, best: FreeRunFit, leading: Sequence[tuple[Candidate, Numbers]]
     ) -> list[tuple[Candidate, Numbers]]:
         """First what leaves least after a few steps of all other numbers, or the simplest form it reduces to.

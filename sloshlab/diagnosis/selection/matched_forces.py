@@ -155,15 +155,15 @@ class _Matches:
         Noise of a recorded velocity has either sign where a place sticks. It makes dry friction jump there, but
         not the spring behind a play, which is dry friction all the same where it is stiff.
         """
-        return self.left(self._told_by(candidate))
+        return self.left(self._best_form(candidate))
 
     def numbers(self, candidate: Candidate) -> dict[str, float]:
         """Its best match, or what is left of the best match of a form that reduces to it and leaves less."""
-        teller = self._told_by(candidate)
-        found = self.of[teller.key][0].numbers
-        return found if teller is candidate else reduced(FreeRunFit((teller,), found, 0.0, 0.0), teller, candidate)
+        form = self._best_form(candidate)
+        found = self.of[form.key][0].numbers
+        return found if form is candidate else reduced(FreeRunFit((form,), found, 0.0, 0.0), form, candidate)
 
-    def _told_by(self, candidate: Candidate) -> Candidate:
+    def _best_form(self, candidate: Candidate) -> Candidate:
         """What leaves least of it and the forms that reduce to it."""
         wider = [other for other in self.candidates if other.reduces_to(candidate)]
         return min((candidate, *wider), key=self.left)
@@ -180,7 +180,7 @@ class _Matches:
 
     def explains(self, candidate: Candidate) -> bool:
         """Whether it, or a form that reduces to it, explains some of what is missing at its place."""
-        matches = self.of.get(self._told_by(candidate).key)
+        matches = self.of.get(self._best_form(candidate).key)
         return matches is not None and matches[0].misfit < 1.0 - LEAST_EXPLAINED
 
     def is_compared(self, candidate: Candidate) -> bool:

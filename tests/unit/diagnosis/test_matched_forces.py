@@ -222,7 +222,7 @@ def test_forces_are_fitted_in_the_order_of_what_they_leave_in_a_simulation(
     monkeypatch.setattr(
         forward_growth, "inflated_cost", lambda problem, fit, inflation: left[fit.candidates[-1].key]
     )
-    found = selection.growth._as_they_simulate(retuned, leading)
+    found = selection.growth._in_order_of_simulation(retuned, leading)
     assert [candidate.effect.name for candidate, _ in found] == [
         "coulomb_friction",
         "friction_behind_play",
