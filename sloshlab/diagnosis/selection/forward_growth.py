@@ -10,7 +10,7 @@ import numpy as np
 from sloshlab.diagnosis.selection.full_fit import HopelessCost, compensated_fit, full_fit
 from sloshlab.diagnosis.selection.known_fits import N_KEPT, KnownFits
 from sloshlab.diagnosis.selection.matched_forces import MatchedForces, matched_forces
-from sloshlab.diagnosis.selection.nested_models import keys_of
+from sloshlab.diagnosis.selection.nested_models import best_form, keys_of
 from sloshlab.diagnosis.selection.proposals import NO_STARTS, Base, most_promising, proposals
 from sloshlab.diagnosis.selection.successive_halving import HOPELESS_COST_RATIO, STEPS_OF_A_RUNG, halved
 from sloshlab.identification.free_run_fit import fitted, inflated_cost, stages_for
@@ -243,9 +243,9 @@ class ForwardGrowth:
         left = {candidate.key: each for (candidate, _), each in zip(leading, costs, strict=True)}
 
         def rank(of: tuple[Candidate, Numbers]) -> tuple[float, int]:
-            [candidate, _] = of
-            forms = [other.key for other, _ in leading if other is candidate or other.reduces_to(candidate)]
-            return min(left[key] for key in forms), len(candidate.names)
+            candidate, _ = of
+            form = best_form(candidate, (other for other, _ in leading), lambda each: left[each.key])
+            return left[form.key], len(candidate.names)
 
         return sorted(leading, key=rank)
 

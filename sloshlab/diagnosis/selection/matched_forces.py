@@ -9,7 +9,7 @@ import numpy as np
 
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
 from sloshlab.diagnosis.selection.known_fits import LEAST_EXPLAINED
-from sloshlab.diagnosis.selection.nested_models import reduced
+from sloshlab.diagnosis.selection.nested_models import best_form, reduced
 from sloshlab.diagnosis.selection.proposals import Places, missing_from
 from sloshlab.diagnosis.selection.successive_halving import HOPELESS_COST_RATIO, N_ALIKE
 from sloshlab.identification.free_run_problem import FreeRunFit
@@ -164,9 +164,7 @@ class _Matches:
         return found if form is candidate else reduced(FreeRunFit((form,), found, 0.0, 0.0), form, candidate)
 
     def _best_form(self, candidate: Candidate) -> Candidate:
-        """What leaves least of it and the forms that reduce to it."""
-        wider = [other for other in self.candidates if other.reduces_to(candidate)]
-        return min((candidate, *wider), key=self.left)
+        return best_form(candidate, self.candidates, self.left)
 
     def rank_of(self, candidate: Candidate) -> tuple[float, int]:
         """For an order in which of two forms that may leave the same the one with fewer numbers comes first."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -45,6 +45,20 @@ def without(fit: FreeRunFit, effect: Candidate) -> FreeRunFit:
     rest = tuple(candidate for candidate in fit.candidates if candidate is not effect)
     own = own_numbers(fit, effect)
     return FreeRunFit(rest, {name: value for name, value in fit.values.items() if name not in own}, 0.0, 0.0)
+
+
+def best_form(candidate: Candidate, among: Iterable[Candidate], left: Callable[[Candidate], float]) -> Candidate:
+    """What leaves least of an effect and the forms that reduce to it.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    among : iterable of Candidate
+        Where these forms are looked for.
+    left : callable
+        What each leaves.
+    """
+    return min((candidate, *(other for other in among if other.reduces_to(candidate))), key=left)
 
 
 def reduced(fit: FreeRunFit, wider: Candidate, simpler: Candidate) -> dict[str, float]:
