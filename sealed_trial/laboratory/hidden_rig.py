@@ -152,7 +152,8 @@ class HiddenRig:
         assert self.beam is not None
         beam, n = self.beam, self.n_modes
         modes = beam_modes(beam, n, self.places_m())
-        masses = modes.mass_kg * [self.factor(f"mass_{k + 1}") for k in range(n)]
+        heavier = np.array([self.factor(f"mass_{k + 1}") for k in range(n)])
+        masses = modes.mass_kg * heavier
         rates = 2 * math.pi * modes.frequency_hz * [self.factor(f"frequency_{k + 1}") for k in range(n)]
         ratios = np.array(self.damping_ratios) * [self.factor(f"damping_{k + 1}") for k in range(n)]
         mass, stiffness = np.diag(masses), np.diag(masses * rates**2)
@@ -162,9 +163,9 @@ class HiddenRig:
             line, length = beam.mass_per_length_kg_per_m, beam.length_m
             inertia = line * length**3 / 3 + beam.tip_mass_kg * length**2
             spring = 1.0 / compliance
-            mass = np.block(
-                [[mass, modes.rocking_kg_m[:, None]], [modes.rocking_kg_m[None, :], np.array([[inertia]])]]
-            )
+            # What the modes have of the inertia, Σ r²/m, stays what it is: more than all of it would be unstable.
+            rocking = modes.rocking_kg_m * np.sqrt(heavier)
+            mass = np.block([[mass, rocking[:, None]], [rocking[None, :], np.array([[inertia]])]])
             stiffness = np.block([[stiffness, np.zeros((n, 1))], [np.zeros((1, n)), np.array([[spring]])]])
             own = 2 * 0.01 * math.sqrt(spring * inertia)
             damping = np.block([[damping, np.zeros((n, 1))], [np.zeros((1, n)), np.array([[own]])]])
