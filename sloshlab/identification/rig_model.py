@@ -259,18 +259,23 @@ class RigModel:
         late = values.get(f"{INSTANT}{run.name}", 0.0) * run.attributes.sampling_rate_hz
         # What drives went through the same recorder, which a linear twin passes on.
         averaging = values.get(AVERAGING, 0.0) if run.is_free else 0.0
-        others = {**known.driving, **{name: truth.channel(name) for name in truth.weights}} if faults else {}
+
+        def on_the_clock(shown: FloatArray) -> FloatArray:
+            return late_by(shown, late, averaging) if late or averaging else shown
+
+        others: dict[str, FloatArray] = {}
+        if any(fault.reads_others for fault in faults):
+            others = {**known.driving, **{name: on_the_clock(truth.channel(name)) for name in truth.weights}}
         for name in truth.weights:
             if request.only and name not in request.only:
                 continue
-            reading = combined(truth.rows, self._read_weights(name, truth.weights, values))
-            # A fault acts on what the sensor would read, gain included; the zero of the channel is added last
-            # and is not delayed, filtered or clipped.
+            reading = on_the_clock(combined(truth.rows, self._read_weights(name, truth.weights, values)))
+            # A fault acts on what the sensor would read, gain included, on the clock of the recording, by which
+            # hum, clocks and held readings go; the zero of the channel is added last and is not delayed, filtered
+            # or clipped.
             for fault in faults:
                 if fault.acts_on(name, run.name):
                     reading = fault.reading(reading, run.attributes.sampling_rate_hz, others, known.recorded[name])
-            if late or averaging:
-                reading = late_by(reading, late, averaging)
             zero = values.get(f"offset of {name} in {run.name}", 0.0)
             readings[name] = reading + zero if zero else reading
         return readings

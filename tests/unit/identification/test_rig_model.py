@@ -76,6 +76,25 @@ def test_the_liquid_may_damp_more_in_one_run_and_as_believed_in_the_others(dampe
         assert np.array_equal(read, as_believed) == (run.name != "decay_1")
 
 
+def test_faults_go_by_the_clock_of_the_recording(damped: RigModel) -> None:
+    """A later release does not make the mains later; what leaks from another channel is late with it."""
+    run, late = damped.runs[0], {**damped.believed, "instant of release in decay_0": 0.0033}
+    time_s = np.arange(run.recording.sizes["time"]) / RATE_HZ
+    mains = np.cos(2 * np.pi * 50.0 * time_s)
+    hum = SensorFault(TIP, lambda read, *_: read + mains, None, ("hum",))
+    leak = SensorFault(
+        "displacement_tank",
+        lambda read, _, others, __: read + 0.1 * others[TIP],
+        None,
+        ("leak",),
+        reads_others=True,
+    )
+    plain = damped.simulate(run, late, NOTHING)
+    read = damped.simulate(run, late, Extension(faults=(hum, leak)))
+    np.testing.assert_allclose(read[TIP] - plain[TIP], mains, atol=1e-9)
+    np.testing.assert_allclose(read["displacement_tank"] - plain["displacement_tank"], 0.1 * plain[TIP], atol=1e-9)
+
+
 def participations(model: RigModel) -> list[str]:
     return [parameter.name for parameter in model.parameters if parameter.name.startswith("base participation")]
 

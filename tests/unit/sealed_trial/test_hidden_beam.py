@@ -42,7 +42,9 @@ def test_a_rigid_translation_is_shared_out_to_the_modes() -> None:
     assert 0.995 * rocking < np.sum(modes.rocking_kg_m**2 / modes.mass_kg) < rocking
 
 
-@pytest.mark.parametrize("heavier", [(1.01, 1.01, 1.01), (0.99, 0.99, 0.99), (0.99, 1.01, 0.99), (1.01, 0.99, 1.01)])
+@pytest.mark.parametrize(
+    "heavier", [(1.01, 1.01, 1.01), (0.99, 0.99, 0.99), (0.99, 1.01, 0.99), (1.01, 0.99, 1.01)]
+)
 @pytest.mark.parametrize("compliance_rad_per_n_m", [1e-8, 1e-6, 1e-4])
 def test_a_root_that_gives_way_lowers_every_frequency(
     heavier: tuple[float, ...], compliance_rad_per_n_m: float
