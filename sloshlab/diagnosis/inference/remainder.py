@@ -65,6 +65,11 @@ class Remainder:
         return float(logsumexp(self.places[place].sum(axis=1)) - np.log(SHARES.size) - self.noise.sum())
 
     @property
+    def likeliest_place(self) -> str:
+        """That of the largest gain; empty without any."""
+        return max(self.places, key=self.gain, default="")
+
+    @property
     def largest_gain(self) -> float:
         """Over all places."""
         return max((self.gain(place) for place in self.places), default=0.0)

@@ -52,7 +52,8 @@ class ForwardGrowth:
 
         The leading ones evolve only where none of them has left nothing by least squares. Beside a force that
         leaves nothing others come only if they are not far worse: a mass or a spring that retuning has hidden may
-        be more probable, and so may a sensor.
+        be more probable, and so may a sensor. Where a sensor is the likeliest place of what is missing all effects
+        come at once, forces from where they match.
 
         Parameters
         ----------
@@ -64,12 +65,13 @@ class ForwardGrowth:
         only : sequence of Candidate, optional
             Those that are tried; all if not given.
         """
-        matched = self.matched_beside(best, what)
-        enough = self._leaving_nothing(best, matched)
-        if enough is None and matched.leading and self.known.has_budget():
-            self.said(f"{what}: matching forces", 0, 1)
-            matched = matched.evolved()
+        matched, enough = self.matched_beside(best, what), None
+        if matched.leading and self.known.lacks_a_force(best):
             enough = self._leaving_nothing(best, matched)
+            if enough is None and self.known.has_budget():
+                self.said(f"{what}: matching forces", 0, 1)
+                matched = matched.evolved()
+                enough = self._leaving_nothing(best, matched)
         self.grown(bases, what, only, matched=matched, against=enough)
 
     def grown(
@@ -125,16 +127,16 @@ class ForwardGrowth:
             lambda name, i, n: self.said(f"{what}: {name}", i, n),
         )
         news = [fit for fit in coarse if not self.known.leaves_less(few, fit, stages[-1])]
-        # The best one first: what is far behind it is not fitted to the end.
-        for some in (news[:1], news[1:]):
-            # A fit with instants of its own in each run may take as much as all that was begun before it.
-            if not only and not self.known.has_budget():
-                break
-            self.known.keep(
-                self.fitted_to_the_end(
-                    some, bases[0], self.known.hopeless_cost(), most_cost=self.known.most_cost_beside(bases[0])
-                )
-            )
+        # The best one first, which has been begun: what is far behind it is not fitted to the end.
+        best, others = news[:1], news[1:]
+        self._keep_to_the_end(best, bases[0])
+        # A fit with instants of its own in each run may take as much as all that was begun before it.
+        if others and (only or self.known.has_budget()):
+            self._keep_to_the_end(others, bases[0])
+
+    def _keep_to_the_end(self, coarse: Sequence[FreeRunFit], base: FreeRunFit) -> None:
+        most_cost = self.known.most_cost_beside(base)
+        self.known.keep(self.fitted_to_the_end(coarse, base, self.known.hopeless_cost(), most_cost=most_cost))
 
     def fitted_to_the_end(
         self,

@@ -10,12 +10,13 @@ import numpy as np
 
 from sloshlab.diagnosis.inference.diverging_motions import DivergingMotions
 from sloshlab.diagnosis.inference.known_runs import KnownRun
+from sloshlab.diagnosis.inference.places import SENSOR, block_of
 from sloshlab.diagnosis.inference.remainder import remainder
 from sloshlab.diagnosis.inference.run_noise import run_noise
 from sloshlab.diagnosis.inference.sampled_jumps import with_sampled_jumps
 from sloshlab.diagnosis.inference.scored_model import complexity, is_worth_a_word
 from sloshlab.diagnosis.inference.thresholds import LAW
-from sloshlab.diagnosis.inference.whitened import whitened
+from sloshlab.diagnosis.inference.whitened import WhitenedRun, whitened
 from sloshlab.diagnosis.selection.explained_scatter import ExplainedScatter
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
 from sloshlab.diagnosis.selection.full_fit import at_its_optimum
@@ -149,13 +150,29 @@ class KnownFits:
         ----------
         fit : FreeRunFit
         """
-        model = self.runs.model
-        # No other model is compared, so that noise and transfers may be those of this one.
-        known = [KnownRun(run, run_noise(model, run, fit.values)) for run in self.runs.problem_of(fit).runs]
-        residuals = whitened(model, known, fit.candidates, fit.values, self._motions)
+        residuals = self._whitened(fit)
         if residuals is None:
             return True
         return is_worth_a_word(residuals) and remainder(residuals, tests=self.runs.tests).is_probable
+
+    def lacks_a_force(self, fit: FreeRunFit) -> bool:
+        """Whether what is left is more probable as a force than as an error of any sensor.
+
+        Parameters
+        ----------
+        fit : FreeRunFit
+        """
+        residuals = self._whitened(fit)
+        if residuals is None:
+            return True
+        return block_of(remainder(residuals, tests=self.runs.tests).likeliest_place) != SENSOR
+
+    def _whitened(self, fit: FreeRunFit) -> list[WhitenedRun] | None:
+        """The fitted runs; None where the simulation does not reach their ends."""
+        model = self.runs.model
+        # No other model is compared, so that noise and transfers may be those of this one.
+        known = [KnownRun(run, run_noise(model, run, fit.values)) for run in self.runs.problem_of(fit).runs]
+        return whitened(model, known, fit.candidates, fit.values, self._motions)
 
     def explains_little(self, n: int) -> bool:
         """Whether the best model of so many effects leaves nearly what the best one of an effect less leaves.
