@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -21,8 +22,44 @@ from sloshlab.twin.twin import Twin
 BLOCKS: Final = ("excitation", "structure", "tank", "aerodynamics", "control", "sensor")
 """Air and control are those of a wing in flight."""
 BLOCKS_OF_A_RIG: Final = ("excitation", "structure", "tank", "sensor")
-MissingForces = Mapping[str, NDArray[np.float64]]
-"""Run → force [N] that the baseline lacks at every sample, upward positive."""
+
+
+@dataclass(frozen=True, eq=False)
+class MissingForce:
+    """Force that the baseline lacks in a run.
+
+    Attributes
+    ----------
+    force_n : ndarray, shape (n,)
+        At every sample, upward positive.
+    noise_power : ndarray, shape (n + 1,), optional
+        Of every frequency of the run padded to twice its length, as E|rfft|² [N²]; of one newton at every sample
+        if not given.
+    """
+
+    force_n: NDArray[np.float64]
+    noise_power: NDArray[np.float64] | None = None
+
+    def along(self, shape: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+        """Matched filter: the force along a shape that begins at each sample, and the power of the shape alone.
+
+        A shape of size A adds A times its power where it begins; the noise of the force along it has this power
+        as its variance.
+
+        Parameters
+        ----------
+        shape : ndarray, shape (m,)
+        """
+        n = self.force_n.size
+        weights = 1.0 if self.noise_power is None else n / self.noise_power
+        of_shape = np.fft.rfft(shape, 2 * n)
+        along = np.fft.irfft(weights * np.fft.rfft(self.force_n, 2 * n) * of_shape.conj(), 2 * n)
+        power = np.fft.irfft(weights * np.abs(of_shape) ** 2, 2 * n)[0]
+        return along[: n - shape.size + 1], float(power)
+
+
+MissingForces = Mapping[str, MissingForce]
+"""By run."""
 
 
 @dataclass(frozen=True)
@@ -217,9 +254,9 @@ def _no_further_starts(surroundings: Surroundings) -> Sequence[Numbers]:
     return []
 
 
-def _no_proposals(surroundings: Surroundings, missing: MissingForces) -> Sequence[Numbers]:
+def _no_proposals(surroundings: Surroundings, missing: MissingForces, known: Numbers) -> Sequence[Numbers]:
     """Reads nothing from the missing force."""
-    del surroundings, missing
+    del surroundings, missing, known
     return []
 
 
@@ -257,8 +294,8 @@ class Effect:
         (surroundings) → more sets of start values, matched to the latent force along the measured motion: many,
         for a multimodal effect.
     proposes : callable
-        (surroundings, missing force of every run) → sets of start values that the missing force itself shows, for
-        forces whose instants or frequency no other place would meet.
+        (surroundings, missing force of every run, numbers that all runs share or none) → sets of start values that
+        the missing force itself shows, for forces whose instants or frequency no other place would meet.
     """
 
     name: str
@@ -277,7 +314,7 @@ class Effect:
     corrects: str = ""
     size: tuple[str, ...] = ()
     sought_at: Callable[[Surroundings], Iterable[Numbers]] = _no_further_starts
-    proposes: Callable[[Surroundings, MissingForces], Iterable[Numbers]] = _no_proposals
+    proposes: Callable[[Surroundings, MissingForces, Numbers], Iterable[Numbers]] = _no_proposals
 
     @property
     def key(self) -> str:
@@ -330,7 +367,7 @@ class Effect:
             self,
             parameters=tuple(parameters),
             starts=lambda at: [spread(numbers) for numbers in self.starts(at)],
-            proposes=lambda at, missing: [spread(numbers) for numbers in self.proposes(at, missing)],
+            proposes=lambda at, missing, known: [spread(found) for found in self.proposes(at, missing, known)],
         )
 
 
@@ -373,9 +410,21 @@ class Candidate:
         """More sets of numbers, named as in a fit, to match to the latent force."""
         return self._named(self.effect.sought_at)
 
-    def proposed(self, missing: MissingForces) -> list[dict[str, float]]:
-        """Sets of numbers, named as in a fit, that a missing force itself shows."""
-        return self._named(lambda at: self.effect.proposes(at, missing))
+    def proposed(
+        self, missing: MissingForces, values: Mapping[str, float] = MappingProxyType({})
+    ) -> list[dict[str, float]]:
+        """Sets of numbers, named as in a fit, that a missing force itself shows.
+
+        Parameters
+        ----------
+        missing : mapping of run to MissingForce
+        values : mapping, optional
+            Of a fit with this effect: only what it has of its own in each run is sought.
+        """
+        shared = {
+            known.name: values[name] for name, known in self.names.items() if not known.run and name in values
+        }
+        return self._named(lambda at: self.effect.proposes(at, missing, shared))
 
     @property
     def prior(self) -> tuple[ParameterPrior, ...]:

@@ -127,27 +127,31 @@ def values_of_runs(
 def _best_started(problem: FreeRunProblem, start: dict[str, float], fit: FreeRunFit) -> dict[str, float]:
     """The best of a start and others of the numbers that an effect has of its own in this run.
 
-    They are what the force shows that lacks without the effect, and the best of many draws, each of them refined:
-    a pulse that is off by its width explains less than none.
+    They are what the force shows that lacks without the effect, or, where it shows none, the best of many draws;
+    each of them refined: a pulse that is off by its width explains less than none.
     """
     spacings: dict[str, float] = {}
     shown: list[dict[str, float]] = []
+    # What differs from repeat to repeat is what is sought here.
+    quiet = [without_scatter(run) for run in problem.runs]
     for candidate in problem.candidates:
         own = places_in_runs(problem, candidate)
         if own:
             rest = tuple(other for other in fit.candidates if other is not candidate)
-            forces = latent_forces(problem.model, problem.runs, replace(fit, candidates=rest))
-            proposed = candidate.proposed(missing_forces(forces)) if forces else []
+            forces = latent_forces(problem.model, quiet, replace(fit, candidates=rest))
+            missing = missing_forces(forces, candidate.effect.block)
+            proposed = candidate.proposed(missing, fit.values) if missing else []
             shown += [{name: numbers[name] for name in own if name in numbers} for numbers in proposed]
             spacings |= own
     if not spacings:
         return start
-    priors = [prior for candidate in problem.candidates for prior in candidate.prior if prior.name in spacings]
-    n_drawn = max((prior.high - prior.low) / spacings[prior.name] for prior in priors)
-    draws = drawn(priors, ceil(n_drawn))
-    best = np.argsort(problem.costs([{**start, **numbers} for numbers in draws]))[:N_REFINED]
-    places = [start, *({**start, **numbers} for numbers in (*shown, *(draws[i] for i in best)))]
-    return _refined(problem, places, spacings)
+    if not shown:
+        priors = [prior for candidate in problem.candidates for prior in candidate.prior if prior.name in spacings]
+        n_drawn = max((prior.high - prior.low) / spacings[prior.name] for prior in priors)
+        draws = drawn(priors, ceil(n_drawn))
+        best = np.argsort(problem.costs([{**start, **numbers} for numbers in draws]))[:N_REFINED]
+        shown = [draws[i] for i in best]
+    return _refined(problem, [start, *({**start, **numbers} for numbers in shown)], spacings)
 
 
 def places_in_runs(problem: FreeRunProblem, candidate: Candidate) -> dict[str, float]:

@@ -4,18 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import welch
 
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.diagnosed_model import DiagnosedModel
 from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.identification.observations import Observation
 from sloshlab.missing_force.latent_force import LatentForce, RunForces, run_forces
-from sloshlab.missing_physics.candidate import MissingForces, extension_of
+from sloshlab.missing_physics.candidate import MissingForce, MissingForces, extension_of
 
 FloatArray = NDArray[np.float64]
+_N_STRETCHES: Final = 8
+"""Of a run, half as many of them overlapping: what is in less than half of these is an event. Pulses in more of
+them count as steady, which takes power from all of them alike.
+"""
 
 
 def latent_forces(
@@ -40,14 +46,33 @@ def latent_forces(
     return found
 
 
-def missing_forces(forces: Mapping[str, RunForces]) -> MissingForces:
-    """Of every run the largest of its latent forces, over the whole run.
+def missing_forces(forces: Mapping[str, RunForces], block: str) -> MissingForces:
+    """Of every run the latent force at a block, over the whole run; where it is not told there the largest one.
 
     Parameters
     ----------
     forces : mapping of run to RunForces
+    block : str
     """
-    return {run: _of_whole_run(max(own.forces, key=lambda force: force.power_n2)) for run, own in forces.items()}
+    found = {
+        run: own.at(block) or max(own.forces, key=lambda force: force.power_n2) for run, own in forces.items()
+    }
+    return {run: MissingForce(_of_whole_run(force), _steady_power(force)) for run, force in found.items()}
+
+
+def _steady_power(force: LatentForce) -> FloatArray:
+    """Power at every frequency of the padded run by the noise of sensors, and by what is there most of the time.
+
+    A slow drift and motion at a resonance that is off by a little are no events; the median over stretches of a
+    run does not see what is in few of them.
+    """
+    n = int(force.run.recording.sizes["time"])
+    frequency, known = np.fft.rfftfreq(2 * n), force.noise_power > 0
+    of_sensors = np.interp(frequency, frequency[known], force.noise_power[known]) if known.any() else 0.0
+    n_per_stretch = max(force.force_n.size // _N_STRETCHES, 2)
+    at, density = welch(force.force_n, nperseg=n_per_stretch, detrend=False, average="median")
+    # one-sided, per cycle a sample
+    return np.asarray(of_sensors + 0.5 * n * np.interp(frequency, at, density))
 
 
 def _of_whole_run(force: LatentForce) -> FloatArray:

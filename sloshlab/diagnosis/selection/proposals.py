@@ -17,7 +17,7 @@ from sloshlab.diagnosis.surroundings import ACROSS_A_BAND, residual_peaks_hz
 from sloshlab.identification.block_jacobian import BlockJacobian
 from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.missing_force.latent_force import RunForces
-from sloshlab.missing_physics.candidate import Candidate, MissingForces
+from sloshlab.missing_physics.candidate import Candidate
 from sloshlab.twin.lane_vector import N_LANES
 
 FloatArray = NDArray[np.float64]
@@ -238,20 +238,17 @@ class Places:
         Frequencies of its largest residuals, where a mode may be missing.
     forces : dict
         Latent forces of each run, where they are known.
-    missing : dict
-        The largest of them, over the whole run.
     """
 
     missed_hz: tuple[float, ...]
     forces: dict[str, RunForces]
-    missing: MissingForces
 
     @classmethod
     def beside(cls, runs: FittedRuns, fit: FreeRunFit, residual: FloatArray) -> Places:
         """Of a fit with its residuals."""
         problem = runs.problem_of(fit)
         forces = latent_forces(runs.model, runs.runs, fit)
-        return cls(residual_peaks_hz(problem.runs, residual, ACROSS_A_BAND), forces, missing_forces(forces))
+        return cls(residual_peaks_hz(problem.runs, residual, ACROSS_A_BAND), forces)
 
     def of(
         self, candidate: Candidate, promising: Sequence[Mapping[str, float]] | None = None
@@ -261,7 +258,7 @@ class Places:
         """
         # A mode has a narrow minimum: it starts where the residuals beside this base are largest.
         here = replace(candidate, surroundings=replace(candidate.surroundings, missed_hz=self.missed_hz))
-        own = [*here.starts(), *candidate.proposed(self.missing)]
+        own = [*here.starts(), *candidate.proposed(missing_forces(self.forces, candidate.effect.block))]
         if promising is not None:
             return [*own, *map(dict, promising)]
         # Numbers of single runs count once.

@@ -5,7 +5,7 @@ What repeats from run to run is size, period and frequency; instants and phases 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from math import ceil, isclose, log, log1p, pi
 from typing import Final
 
@@ -99,33 +99,40 @@ def _pulses(block: str, *, alternates: bool) -> Callable[[Numbers, str, Surround
     return term
 
 
-def _pulses_in(*, alternate: bool) -> Callable[[Surroundings, MissingForces], list[Numbers]]:
-    """The train that explains most of a missing force, for pulses upward and downward."""
+def _pulses_in(*, alternate: bool) -> Callable[[Surroundings, MissingForces, Numbers], list[Numbers]]:
+    """The train that explains most of a missing force, for pulses upward and downward; or the instants of one."""
 
-    def proposed(at: Surroundings, missing: MissingForces) -> list[Numbers]:
+    def proposed(at: Surroundings, missing: MissingForces, known: Numbers) -> list[Numbers]:
         best: dict[float, tuple[float, int, Numbers]] = {}
-        for in_periods in _WIDTHS:
-            n = max(4, round(in_periods / at.frequency_hz * at.sampling_rate_hz))
+        widths_s = [known["width_s"]] if known else [share / at.frequency_hz for share in _WIDTHS]
+        signs = [float(np.sign(known["size_n"]))] if known else [1.0, -1.0]
+        for width_s in widths_s:
+            n = max(4, round(width_s * at.sampling_rate_hz))
             shape = 0.5 * (1 - np.cos(2 * pi * np.arange(n) / n))
-            longest = min((force.size for force in missing.values()), default=0)
+            longest = min((each.force_n.size for each in missing.values()), default=0)
             if longest <= 4 * n:
                 continue
-            # force along the shape of a pulse that begins at each place, of which eight are within a width
+            # in standard deviations of its noise; eight places are within a width
             apart = max(1, n // _PLACES_PER_WIDTH)
-            along = {
-                run: np.ascontiguousarray((np.correlate(force, shape, "valid") / (shape @ shape))[::apart])
-                for run, force in missing.items()
-            }
-            periods = _periods(n / apart, longest / apart)
+            matched = {run: each.along(shape) for run, each in missing.items()}
+            roots = np.sqrt([power for _, power in matched.values()])
+            along = [
+                np.ascontiguousarray(values[::apart] / root)
+                for (values, _), root in zip(matched.values(), roots, strict=True)
+            ]
+            rate = at.sampling_rate_hz / apart
+            periods = np.array([known["period_s"] * rate]) if known else _periods(n / apart, longest / apart)
             # (run, period, direction, column)
-            places = np.stack([_best_places(values, periods, alternate) for values in along.values()])
-            explained, force, weight, _ = np.moveaxis(places.sum(axis=0), -1, 0)
-            for row, sign in enumerate((1.0, -1.0)):
+            places = np.stack([_best_places(values, periods, alternate) for values in along])
+            explained = places[..., 0].sum(axis=0)
+            # the size that fits the pulses of all runs, by least squares
+            force, weight = np.tensordot(roots, places[..., 1], 1), np.tensordot(roots**2, places[..., 2], 1)
+            for sign in signs:
+                row = 0 if sign > 0 else 1
                 k = int(np.argmax(explained[:, row]))
-                score = float(explained[k, row] * (shape @ shape))
+                score = float(explained[k, row])
                 if score > best.get(sign, (0.0,))[0]:
-                    rate = at.sampling_rate_hz / apart
-                    first = zip(along, places[:, k, row, 3].tolist(), strict=True)
+                    first = zip(missing, places[:, k, row, 3].tolist(), strict=True)
                     starts = {in_run("start_s", run): place / rate for run, place in first}
                     size = float(sign * force[k, row] / weight[k, row])
                     train = {
@@ -133,7 +140,8 @@ def _pulses_in(*, alternate: bool) -> Callable[[Surroundings, MissingForces], li
                         "period_s": float(periods[k]) / rate,
                         "width_s": n / at.sampling_rate_hz,
                     }
-                    best[sign] = (score, sum(start < 0 for start in starts.values()), {**train, **starts})
+                    began = sum(start < 0 for start in starts.values())
+                    best[sign] = (score, began, {**train, **known, **starts})
         ranked = sorted(best.values(), key=lambda found: (-found[0], found[1]))
         if alternate and len(ranked) == 2 and isclose(ranked[0][0], ranked[1][0]) and ranked[0][1] != ranked[1][1]:
             # What alternates is as well its own reverse, begun a period earlier. Told by the first pulse that is
@@ -263,32 +271,36 @@ def _line_starts(at: Surroundings) -> Iterable[Numbers]:
     ]
 
 
-def _lines_in(at: Surroundings, missing: MissingForces) -> list[Numbers]:
-    """The strongest lines of the missing force of all runs, each with its phase in every run."""
+def _lines_in(at: Surroundings, missing: MissingForces, known: Numbers) -> list[Numbers]:
+    """The strongest lines of the missing force of all runs, each with its phase in every run; or phases of one."""
     if not missing:
         return []
-    n = 4 * max(force.size for force in missing.values())
-    power = sum(np.abs(np.fft.rfft(force - force.mean(), n)) ** 2 for force in missing.values())
-    spectrum = np.asarray(power)
-    inner = np.flatnonzero((spectrum[1:-1] > spectrum[:-2]) & (spectrum[1:-1] >= spectrum[2:])) + 1
+    forces = {run: each.force_n - each.force_n.mean() for run, each in missing.items()}
+    frequencies = [known["frequency_hz"]] if known else _strongest_lines_hz(list(forces.values()), at)
     found: list[Numbers] = []
-    for k in inner[np.argsort(-spectrum[inner])][:_MOST_LINES]:
-        frequency = float(k) * at.sampling_rate_hz / n
-        amplitudes = {run: _amplitude(force, frequency, at) for run, force in missing.items()}
+    for frequency in frequencies:
+        amplitudes = {run: _amplitude(force, frequency, at) for run, force in forces.items()}
         phases = {
             # F sin 2π(f t + φ) is the real part of −i F e^(2πi(f t + φ))
             in_run("phase", run): float(np.angle(1j * value) / (2 * pi) % 1.0)
             for run, value in amplitudes.items()
         }
         size = float(np.mean([abs(value) for value in amplitudes.values()]))
-        found.append({"size_n": size, "frequency_hz": frequency, **phases})
+        found.append({"size_n": size, "frequency_hz": frequency, **known, **phases})
     return found
 
 
+def _strongest_lines_hz(forces: Sequence[FloatArray], at: Surroundings) -> list[float]:
+    n = 4 * max(force.size for force in forces)
+    spectrum = np.asarray(sum(np.abs(np.fft.rfft(force, n)) ** 2 for force in forces))
+    inner = np.flatnonzero((spectrum[1:-1] > spectrum[:-2]) & (spectrum[1:-1] >= spectrum[2:])) + 1
+    return [float(k) * at.sampling_rate_hz / n for k in inner[np.argsort(-spectrum[inner])][:_MOST_LINES]]
+
+
 def _amplitude(force: FloatArray, frequency_hz: float, at: Surroundings) -> complex:
-    """Complex amplitude of a line about the instant to which phases refer."""
+    """Complex amplitude of a line about the instant to which phases refer, in a force without its mean."""
     time = np.arange(force.size) / at.sampling_rate_hz - 0.5 * at.longest_run_s
-    return complex(2.0 * np.mean((force - force.mean()) * np.exp(-2j * pi * frequency_hz * time)))
+    return complex(2.0 * np.mean(force * np.exp(-2j * pi * frequency_hz * time)))
 
 
 _SEPARATED_BY: Final = "a run in which nothing is driven or released; a run when the machines around are off"

@@ -20,7 +20,7 @@ from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.identification.observations import observations
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_physics import effects
-from sloshlab.missing_physics.candidate import Candidate, Surroundings, candidates
+from sloshlab.missing_physics.candidate import Candidate, MissingForce, Surroundings, candidates
 from sloshlab.twin.excitation import free
 from sloshlab.twin.external_forces import HARMONIC_FORCE, PULSE_TRAIN
 from sloshlab.twin.structure import single_degree_of_freedom
@@ -85,9 +85,11 @@ def pulsed(tmp_path_factory: pytest.TempPathFactory) -> RigModel:
     return RigModel(rig(folder), folder, runs)
 
 
-def pulses(start_s: float, every_other: float = 1.0) -> Callable[[float, float, float], float]:
+def pulses(
+    start_s: float, every_other: float = 1.0, period_s: float = PERIOD_S
+) -> Callable[[float, float, float], float]:
     def force(t: float, x: float, v: float) -> float:
-        n, within = divmod(t - start_s, PERIOD_S)
+        n, within = divmod(t - start_s, period_s)
         inside = t >= start_s and within < WIDTH_S
         sign = every_other if n % 2 else 1.0
         return sign * FORCE_N * 0.5 * (1 - np.cos(2 * np.pi * within / WIDTH_S)) if inside else 0.0
@@ -120,7 +122,9 @@ def test_a_missing_force_shows_the_train_that_is_in_it(pulsed: RigModel) -> None
     generator = np.random.default_rng(5)
     time = np.arange(2000) / RATE_HZ
     missing = {
-        name: np.array([pulses(start)(t, 0.0, 0.0) for t in time]) + 0.3 * generator.standard_normal(time.size)
+        name: MissingForce(
+            np.array([pulses(start)(t, 0.0, 0.0) for t in time]) + 0.3 * generator.standard_normal(time.size)
+        )
         for name, start in (("first", 0.37), ("second", 0.21))
     }
     train = Candidate(effect("structure.external_force").of_runs(("first", "second")), of_runs(pulsed))
@@ -134,6 +138,44 @@ def test_a_missing_force_shows_the_train_that_is_in_it(pulsed: RigModel) -> None
         assert abs(off) < WIDTH_S
 
 
+def test_pulses_show_beside_what_accelerometers_do_not_tell(pulsed: RigModel) -> None:
+    """A slow force stronger than the pulses is noise of a double integral, whose power falls with f⁴."""
+    generator, starts, key = np.random.default_rng(8), {"first": 0.37, "second": 0.21}, "structure.external_force"
+    time, n = np.arange(2000) / RATE_HZ, 2000
+    frequency_hz = np.fft.rfftfreq(2 * n, 1 / RATE_HZ)
+    noise_power = n * 0.35**2 * (1.0 + (5.0 / np.maximum(frequency_hz, 0.3)) ** 4)
+    of_noise = np.sqrt(noise_power / n)
+    missing = {}
+    for name, start in starts.items():
+        slow = np.fft.irfft(of_noise * np.fft.rfft(generator.standard_normal(2 * n)), 2 * n)[:n]
+        force = np.array([pulses(start)(t, 0.0, 0.0) for t in time]) + slow
+        assert np.std(slow) > FORCE_N
+        missing[name] = MissingForce(force, noise_power)
+    train = Candidate(effect(key).of_runs(tuple(starts)), of_runs(pulsed))
+    best = train.proposed(missing)[0]
+    assert best[f"{key}.period_s"] == pytest.approx(PERIOD_S, abs=0.5 * WIDTH_S * PERIOD_S / 8.0)
+    assert best[f"{key}.size_n"] == pytest.approx(FORCE_N, rel=0.25)
+    for name, start in starts.items():
+        assert best[f"{key}.start_s in {name}"] == pytest.approx(start, abs=WIDTH_S)
+
+
+def test_a_force_along_a_shape_is_its_size_with_the_noise_of_its_power() -> None:
+    """As a matched filter (North 1943): A p where a shape of size A begins, and p is the variance of the noise."""
+    generator, n, rate_hz = np.random.default_rng(9), 2000, 250.0
+    noise_power = n * 0.3**2 * (1.0 + (np.fft.rfftfreq(2 * n, 1 / rate_hz) / 20.0) ** 2)
+    shape = 0.5 * (1 - np.cos(2 * np.pi * np.arange(40) / 40))
+    pulse = np.zeros(n)
+    pulse[700:740] = 2.5 * shape
+    along, power = MissingForce(pulse, noise_power).along(shape)
+    assert along.size == n - shape.size + 1
+    assert np.argmax(along) == 700
+    assert along[700] == pytest.approx(2.5 * power)
+    white = generator.standard_normal((20, 2 * n))
+    coloured = np.fft.irfft(np.sqrt(noise_power / n) * np.fft.rfft(white), 2 * n)[:, :n]
+    of_noise = [MissingForce(force, noise_power).along(shape)[0] for force in coloured]
+    assert np.var(of_noise) == pytest.approx(power, rel=0.1)
+
+
 @pytest.mark.parametrize("key", ["structure.external_force", "structure.alternating_pulses"])
 @pytest.mark.parametrize("size_n", [FORCE_N, -FORCE_N])
 def test_a_train_may_begin_later_than_its_period_or_before_the_run(
@@ -144,7 +186,9 @@ def test_a_train_may_begin_later_than_its_period_or_before_the_run(
     starts = {"first": 0.13, "second": PERIOD_S + 0.08} | ({"third": 0.27 - PERIOD_S} if alternates else {})
     time = np.arange(2000) / RATE_HZ
     missing = {
-        name: np.array([size_n / FORCE_N * pulses(start, -1.0 if alternates else 1.0)(t, 0.0, 0.0) for t in time])
+        name: MissingForce(
+            np.array([size_n / FORCE_N * pulses(start, -1.0 if alternates else 1.0)(t, 0.0, 0.0) for t in time])
+        )
         for name, start in starts.items()
     }
     train = Candidate(effect(key).of_runs(tuple(starts)), of_runs(pulsed))
@@ -160,7 +204,10 @@ def test_alternating_pulses_are_told_by_the_first_that_is_seen(pulsed: RigModel)
     """Reversed they would have begun before the runs, and in a run that they begin late one pulse too many."""
     starts, key = {"first": 0.13, "second": 0.21}, "structure.alternating_pulses"
     time = np.arange(2000) / RATE_HZ
-    missing = {name: np.array([pulses(start, -1.0)(t, 0.0, 0.0) for t in time]) for name, start in starts.items()}
+    missing = {
+        name: MissingForce(np.array([pulses(start, -1.0)(t, 0.0, 0.0) for t in time]))
+        for name, start in starts.items()
+    }
     train = Candidate(effect(key).of_runs(tuple(starts)), of_runs(pulsed))
     [only] = train.proposed(missing)
     assert only[f"{key}.size_n"] == pytest.approx(FORCE_N, rel=0.25)
@@ -176,7 +223,9 @@ def test_a_missing_force_shows_the_line_that_is_in_it(pulsed: RigModel) -> None:
     middle = 0.5 * at.longest_run_s
     phases = {"first": 0.8, "second": 0.3}
     missing = {
-        name: 1.7 * np.sin(2 * np.pi * (11.3 * (time - middle) + phase)) + 0.3 * generator.standard_normal(1000)
+        name: MissingForce(
+            1.7 * np.sin(2 * np.pi * (11.3 * (time - middle) + phase)) + 0.3 * generator.standard_normal(1000)
+        )
         for name, phase in phases.items()
     }
     line = Candidate(effect("structure.harmonic_force").of_runs(tuple(phases)), at)
@@ -223,6 +272,27 @@ def test_the_instant_of_pulses_is_found_in_a_run_that_was_not_fitted(pulsed: Rig
     fit = FreeRunFit((train,), {**pulsed.believed, **{f"{key}.{n}": v for n, v in numbers.items()}}, 0.0, 0.0)
     found = values_of_runs(pulsed, [second], fit)
     assert found[f"{key}.start_s in second"] == pytest.approx(0.81, abs=0.002)
+
+
+def test_of_a_known_train_a_missing_force_shows_the_instants_alone(pulsed: RigModel) -> None:
+    """Beside twice as strong blows of another train, of which it would show those otherwise."""
+    time, key = np.arange(1000) / RATE_HZ, "structure.external_force"
+    other = pulses(0.05, period_s=0.7)
+    missing = {
+        "second": MissingForce(np.array([pulses(0.81)(t, 0.0, 0.0) + 2.0 * other(t, 0.0, 0.0) for t in time]))
+    }
+    train = Candidate(effect(key).of_runs(("first", "second")), of_runs(pulsed))
+    known = {f"{key}.size_n": FORCE_N, f"{key}.period_s": PERIOD_S, f"{key}.width_s": WIDTH_S}
+    [only] = train.proposed(missing, {**known, f"{key}.start_s in first": 0.37, "frequency of mode 1": 1.0})
+    assert only == pytest.approx({**known, f"{key}.start_s in second": 0.81}, abs=0.25 * WIDTH_S)
+    assert train.proposed(missing)[0][f"{key}.period_s"] != pytest.approx(PERIOD_S, rel=0.1)
+    line = Candidate(effect("structure.harmonic_force").of_runs(("first", "second")), of_runs(pulsed))
+    middle = 0.5 * of_runs(pulsed).longest_run_s
+    weak, strong = (size * np.sin(2 * np.pi * f * (time - middle)) for size, f in ((1.0, 11.3), (5.0, 4.0)))
+    known = {f"{line.key}.size_n": 1.2, f"{line.key}.frequency_hz": 11.3}
+    [only] = line.proposed({"second": MissingForce(weak + strong)}, known)
+    assert {name: only[name] for name in known} == known
+    assert abs((only[f"{line.key}.phase in second"] + 0.5) % 1.0 - 0.5) < 0.03
 
 
 def test_an_instant_is_refined_where_a_pulse_explains_less_than_none(pulsed: RigModel) -> None:

@@ -30,7 +30,7 @@ from sloshlab.identification.free_run_problem import FreeRunProblem
 from sloshlab.identification.observations import observations
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_physics import effects
-from sloshlab.missing_physics.candidate import Candidate, candidates
+from sloshlab.missing_physics.candidate import Candidate, MissingForce, candidates
 from sloshlab.missing_physics.update_rates import update_rates_hz
 
 assert effects.__all__
@@ -123,10 +123,10 @@ def tone(phase: float) -> Callable[[float, float, float], float]:
     return lambda t, x, v: 0.6 * np.sin(2 * np.pi * (9.4 * (t - 2.0) + phase))
 
 
-def missing_force(run: CaseRun) -> np.ndarray:
+def missing_force(run: CaseRun) -> MissingForce:
     """m a + c v + k x from the recording alone."""
     x, a = (run.recording[name].values for name in ("displacement_tank", TIP))
-    return np.asarray(MASS_KG * a + DAMPING * np.gradient(x, 1 / RATE_HZ) + STIFFNESS * x)
+    return MissingForce(np.asarray(MASS_KG * a + DAMPING * np.gradient(x, 1 / RATE_HZ) + STIFFNESS * x))
 
 
 def runs_with(forces: Sequence[Callable[[float, float, float], float]]) -> list[CaseRun]:
