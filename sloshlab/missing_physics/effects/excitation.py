@@ -99,7 +99,13 @@ SATURATION = register(
             _SATURATION,
             *(
                 {"limit": limit, "dead_zone": dead_zone}
-                for limit, dead_zone in ((0.8, 0.005), (0.5, 0.005), (0.98, 0.1), (0.7, 0.1))
+                # a limit that is hardly met leads to the one that is there, but not past a dead zone that is not
+                for limit, dead_zone in (
+                    (0.8, 0.005),
+                    *((limit, 0.0) for limit in (0.98, 0.9, 0.7, 0.5)),
+                    (0.98, 0.1),
+                    (0.7, 0.1),
+                )
             ),
         ),
         _saturates,

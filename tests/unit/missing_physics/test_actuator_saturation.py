@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_physics import effects
 from sloshlab.missing_physics.candidate import Candidate
 from sloshlab.missing_physics.effects.excitation import saturated
-from sloshlab.missing_physics.extension import NOTHING
+from sloshlab.missing_physics.extension import NOTHING, Extension
 
 assert effects.__all__
 LIMIT, DEAD_ZONE = 0.9, 0.12
@@ -80,3 +81,20 @@ def test_a_command_drives_alone(model: RigModel) -> None:
     assert list(saturation.places(replace(at, driving=()))) == []
     machine = replace(at, rig=None, driving=("voltage_shaker", "force_left"))  # type: ignore[arg-type]
     assert list(saturation.places(machine)) == ["voltage_shaker", "force_left"]
+
+
+def test_a_start_leads_to_a_limit_that_is_hardly_met(tmp_path: Path) -> None:
+    """Without a dead zone, which every reading of a slow command would show."""
+    time, _, _, _ = motion(0.0, 6.0)
+    command = np.array([base_motion(t) for t in time])
+    limit = 0.92 * np.abs(command).max()
+    _, _, _, a = motion(0.0, 6.0, base=lambda t: float(np.clip(base_motion(t), -limit, limit)))
+    run = run_of("driven", {TIP: a + np.clip(command, -limit, limit), ROOT: command}, {}, 1, experiment="other")
+    model = RigModel(rig(tmp_path), tmp_path, [run])
+    candidate = Candidate(effect("excitation.actuator_saturation"), surroundings(model), ROOT)
+
+    def left(extension: Extension) -> float:
+        return float(np.std(model.simulate(run, model.believed, extension)[TIP] - run.recording[TIP].values))
+
+    starts = [{name.rpartition(".")[2]: value for name, value in start.items()} for start in candidate.starts()]
+    assert min(left(candidate.extension(start)) for start in starts) < 0.9 * left(NOTHING)
