@@ -146,18 +146,17 @@ def _noise_of_drives(
             continue
         spectra = {name: spectrum_of[name] for name in driving}
         drawn = _propagated_noise(case, run, spectra, plain=plain, fit=fit)
-        draws |= _shared(drawn, driving)
         added = _added_variances(observed, drawn, driving)
+        draws |= _shared(drawn, added, driving)
         variances |= added
         for left_out in driving if len(driving) > 1 else ():
             # An effect on a sensor leaves the drive to the others, against whose noise its gain must count.
             kept = [name for name in driving if name != left_out]
             others = replace(run, recording=run.recording.drop_vars(left_out))
             drawn = _propagated_noise(case, others, {name: spectra[name] for name in kept}, plain=plain, fit=fit)
+            more = _added_variances(observed, drawn, kept)
             without.setdefault(left_out, {}).update(
-                _beside_fault(
-                    observed, added, _shared(drawn, kept), _added_variances(observed, drawn, kept), left_out
-                )
+                _beside_fault(observed, added, _shared(drawn, more, kept), more, left_out)
             )
     return variances, draws, without
 
@@ -181,9 +180,18 @@ def _added_variances(observed: Sequence[Observation], drawn: _OfChannels, drivin
     return found
 
 
-def _shared(drawn: _OfChannels, driving: Sequence[str]) -> _OfChannels:
-    """Draws of what channels share with a drive: deviations from the mean of those that drive share nothing."""
-    return {place: 0.0 * of_channel if place[1] in driving else of_channel for place, of_channel in drawn.items()}
+def _shared(drawn: _OfChannels, added: _OfChannels, driving: Sequence[str]) -> _OfChannels:
+    """Draws of what channels share with a drive: deviations from the mean of those that drive share nothing.
+
+    They have the power that is added to the variances, of which they would tell less than all otherwise.
+    """
+    shared = {}
+    for place, of_channel in drawn.items():
+        power = _steady(of_channel**2)
+        is_shared = (power > 0) & (place[1] not in driving)
+        ratio = np.divide(added[place], power, out=np.zeros(power.shape), where=is_shared)
+        shared[place] = np.sqrt(ratio) * of_channel
+    return shared
 
 
 def _beside_fault(
