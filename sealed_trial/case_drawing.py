@@ -90,20 +90,10 @@ class _Prepared:
     plain: list[Signals]
     scales: Scales
     sensors: dict[str, Sensor]
-    told: dict[str, float] = field(default_factory=dict)
 
     @cached_property
     def floor(self) -> NoiseFloor:
         return NoiseFloor(self.laboratory, self.plain, self.sensors)
-
-    def told_from_damping(self, effect: DrawnEffect) -> float:
-        """Part of the strength of an effect that is left with damping free; of its usual magnitude, once."""
-        if effect.name not in self.told:
-            self.floor.start_anew()
-            changed = self.laboratory.signals([effect.change(1.0)], relative_tolerance=QUICK)
-            known, free = (self.floor.strength(changed, damping_is_known=known) for known in (True, False))
-            self.told[effect.name] = free / known if known > 0 else 1.0
-        return self.told[effect.name]
 
 
 class CaseDrawing:
@@ -196,11 +186,9 @@ class CaseDrawing:
         prepared = self._laboratory(number, attempt // _HIDDEN_DRAWS, plan_name)
         laboratory, plain, sensors = prepared.laboratory, prepared.plain, prepared.sensors
         hidden = self._generator(number, 3, attempt)
-        drawn, accepted, wanted, alike = self._drawn_effects(
+        drawn, accepted, wanted = self._drawn_effects(
             kind, laboratory.plan, laboratory.rig, prepared.scales, hidden
         )
-        if alike is not None:
-            _require_within_noise(alike, wanted[0], prepared)
         changes, described = [], []
         for effect, strength in zip(drawn, wanted, strict=True):
             change, reached = _scaled(effect, strength, laboratory, prepared.floor, plain)
@@ -241,26 +229,25 @@ class CaseDrawing:
 
     def _drawn_effects(
         self, kind: str, plan: TestPlan, rig: HiddenRig, scales: Scales, generator: np.random.Generator
-    ) -> tuple[list[DrawnEffect], list[list[str]], list[float], DrawnEffect | None]:
-        """Effects, the answers that are right, the strengths wanted, and what damping alone has to hide."""
+    ) -> tuple[list[DrawnEffect], list[list[str]], list[float]]:
+        """Effects, the answers that are right, and the strengths wanted."""
         if kind in ("nothing", "retunable"):
-            return [], [[]], [], None
+            return [], [[]], []
         if kind == "look_alike":
             choices = possible_look_alikes(plan, rig)
             if not choices:
                 raise LookupError("no look-alike for this plan")
             chosen = choices[int(generator.integers(len(choices)))]
             effect = chosen.truth.draw(scales, generator)
-            alike = None if chosen.but_for_damping is None else chosen.but_for_damping.draw(scales, generator)
-            return [effect], [list(names) for names in chosen.equals], [_clear(generator)], alike
+            return [effect], [list(names) for names in chosen.equals], [_clear(generator)]
         vocabulary = UNKNOWN_PHYSICS if kind == "outside" else self._vocabulary
         effects = self._chosen(possible(vocabulary, plan, rig), 2 if kind == "pair" else 1, generator)
         drawn = [effect.draw(scales, generator) for effect in effects]
         if kind == "masked":
             span = math.log(STRONGEST_MASKED / WEAKEST_MASKED)
-            return drawn, [[drawn[0].name]], [WEAKEST_MASKED * math.exp(span * generator.random())], None
+            return drawn, [[drawn[0].name]], [WEAKEST_MASKED * math.exp(span * generator.random())]
         accepted = [["unknown"]] if kind == "outside" else [[effect.name for effect in drawn]]
-        return drawn, accepted, [_clear(generator) for _ in drawn], None
+        return drawn, accepted, [_clear(generator) for _ in drawn]
 
     def _chosen(
         self, effects: Sequence[HiddenEffect], n: int, generator: np.random.Generator
@@ -335,13 +322,6 @@ def _scaled(
     if effect.essential is not None and strength_of_change(effect.essential(magnitude)) < WEAKEST_CLEAR:
         raise LookupError(f"{effect.name} does not show what makes it")
     return effect.change(magnitude), reached
-
-
-def _require_within_noise(alike: DrawnEffect, wanted: float, prepared: _Prepared) -> None:
-    """Equals of a look-alike predict the same: what damping leaves of one of them is no more than is masked."""
-    left = prepared.told_from_damping(alike) * wanted
-    if not left < WEAKEST_MASKED:
-        raise LookupError(f"{alike.name} is told from damping by {left:.2g} noise floors")
 
 
 def _description(effect: DrawnEffect, change: Change, strength: float) -> dict[str, Any]:

@@ -1,7 +1,8 @@
 """Pairs of explanations that a plan cannot tell apart: the truth, and every set of names that is as good.
 
 A spring or a mass of the structure is none of them: it is a number of the baseline, which may be wrong
-(`hidden_rig.wrongly_believed`).
+(`hidden_rig.wrongly_believed`). Nor are dashpots and losses without frequency: the relaxing springs of these creep
+after a release or a start, by which decays tell them apart to thousands of nats, and one frequency to hundreds.
 """
 
 from __future__ import annotations
@@ -28,25 +29,15 @@ class LookAlike:
         Sets of effects, each of which explains as much, the truth included.
     plans : tuple of str
         Where this holds.
-    but_for_damping : HiddenEffect or None
-        The one of the equals that damping hides, where recordings do not tell it from a dashpot. A loss without
-        frequency comes from springs that relax, and a release shows how they creep: whether that is within the
-        noise, each case tells.
     """
 
     truth: HiddenEffect
     equals: tuple[tuple[str, ...], ...]
     plans: tuple[str, ...]
-    but_for_damping: HiddenEffect | None = None
 
 
-_DECAYS_OF_SDOF = ("sdof_decays",)
-_ONE_FREQUENCY = ("sdof_one_frequency",)
 _ASYMMETRIC = (("asymmetric_friction",), ("coulomb_friction", "constant_force"))
 _TANK_MASS = (("mass_error",), ("effective_mass",))
-_LOSSES = (("viscous_damping",), ("structural_damping",))
-
-_STRUCTURAL: Final = HiddenEffect("structural_damping", "structure", structure_effects.structural, ("sdof",))
 
 LOOK_ALIKES: Final = (
     LookAlike(
@@ -60,13 +51,6 @@ LOOK_ALIKES: Final = (
         HiddenEffect("mass_error", "tank", tank_effects.mass, _ALL),
         _TANK_MASS,
         ("sdof_base", "sdof_mixed", "beam_decays", "beam_base", "beam_mixed", "shaker_sweeps", "shaker_stepped"),
-    ),
-    LookAlike(_STRUCTURAL, _LOSSES, _DECAYS_OF_SDOF + _ONE_FREQUENCY, _STRUCTURAL),
-    LookAlike(
-        HiddenEffect("viscous_damping", "structure", structure_effects.viscous, ("sdof",)),
-        _LOSSES,
-        _DECAYS_OF_SDOF + _ONE_FREQUENCY,
-        _STRUCTURAL,
     ),
     LookAlike(
         HiddenEffect("viscous_damping", "tank", tank_effects.viscous, ("shaker",), tank_model="frozen"),

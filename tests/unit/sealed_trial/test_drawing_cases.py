@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sealed_trial import case_drawing
-from sealed_trial.case_drawing import CaseDrawing, _motion, _require_within_noise, _scaled, class_order
+from sealed_trial.case_drawing import CaseDrawing, _motion, _scaled, class_order
 from sealed_trial.composition import SINGLES, class_sizes, possible
 from sealed_trial.hidden_physics.effect import Change, DrawnEffect, Scales
 from sealed_trial.hidden_physics.sensor_effects import cross_talk, gain
@@ -19,7 +19,7 @@ from sealed_trial.laboratory.hidden_rig import drawn_rig, rig_text, wrongly_beli
 from sealed_trial.laboratory.recorder import drawn_recorder
 from sealed_trial.laboratory.recording_file import run_attributes
 from sealed_trial.laboratory.test_plan import PLANS, drawn_plan
-from sealed_trial.look_alikes import LOOK_ALIKES, possible_look_alikes
+from sealed_trial.look_alikes import possible_look_alikes
 from sealed_trial.scoring.rivals import commonest, metadata_classifier
 from sealed_trial.strength import magnitude_for
 
@@ -230,29 +230,6 @@ def test_a_strength_is_that_about_baselines_near_the_magnitude(wanted: float) ->
     change, reached = _scaled(effect, wanted, laboratory, FloorWithFewBaselines(), [])  # type: ignore[arg-type]
     assert change.parameters["size"] == pytest.approx(reached, rel=1e-12)
     assert reached == pytest.approx(wanted, rel=0.09)
-
-
-@pytest.mark.slow
-def test_a_loss_is_the_equal_of_a_dashpot_only_where_it_predicts_the_same() -> None:
-    """Free damping is a dashpot, which hides all of another one, but not relaxing springs, which creep."""
-    drawing = CaseDrawing([77, 1])
-    [structural] = {alike.but_for_damping for alike in LOOK_ALIKES if alike.but_for_damping is not None}
-    assert structural.name == "structural_damping"
-    prepared = drawing._laboratory(1, 0, "sdof_decays")
-    drawn = {
-        effect.name: effect.draw(prepared.scales, np.random.default_rng(1))
-        for effect in SINGLES
-        if (effect.block, effect.name) in {("structure", "viscous_damping"), ("structure", "coulomb_friction")}
-    } | {"structural_damping": structural.draw(prepared.scales, np.random.default_rng(1))}
-    left = {name: prepared.told_from_damping(effect) for name, effect in drawn.items()}
-    assert left["viscous_damping"] < 0.05
-    assert left["coulomb_friction"] > 0.3
-    assert left["viscous_damping"] < left["structural_damping"] < 1.0
-    # told by a third of a noise floor at most
-    weak, strong = (size / left["structural_damping"] for size in (0.29, 0.31))
-    _require_within_noise(drawn["structural_damping"], weak, prepared)
-    with pytest.raises(LookupError, match="told from damping"):
-        _require_within_noise(drawn["structural_damping"], strong, prepared)
 
 
 def test_the_motion_of_a_tank_is_relative_to_its_base() -> None:
