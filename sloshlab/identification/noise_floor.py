@@ -18,7 +18,7 @@ from sloshlab.identification.case import Case, CaseRun
 from sloshlab.identification.diagnosed_model import DiagnosedModel
 from sloshlab.identification.drive_noise import NoiseSpectrum, noise_spectrum
 from sloshlab.identification.free_run_fit import fitted
-from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem
+from sloshlab.identification.free_run_problem import TEMPERING, FreeRunFit, FreeRunProblem
 from sloshlab.identification.observations import (
     IGNORED_VARIANCE,
     Observation,
@@ -39,8 +39,6 @@ _N_NOISE_DRAWS: Final = 4
 """Simulations with other noise, over which squares are averaged."""
 N_BLOCKS: Final = 9
 """Over which squares are averaged: noise through a resonance is steady."""
-_DOMINANT_NOISE_RATIO: Final = 1.0
-"""Variance by the noise of drives over that of the sensor itself, from which the former dominates."""
 _SLOW_DISPLACEMENT_ERROR: Final = 3.0
 """Standard deviations by noise to which a slow displacement is known after the removal of drift."""
 _RELATIVE_REACH: Final = 0.05
@@ -107,8 +105,8 @@ def weighted_observations(case: Case, model: DiagnosedModel) -> dict[str, list[O
         name: within_informative_bands(
             [
                 # Judged by the final variance: whether something stands out of the noise depends on all of it.
-                _ignored_where_drive_noise_dominates(observation, of_sensor, noise, model.driving(observation.run))
-                for observation, of_sensor in zip(observed, sensors[name], strict=True)
+                _ignored_where_drive_noise_counts(observation, noise, model.driving(observation.run))
+                for observation in observed
             ]
         )
         for name, observed in weighted.items()
@@ -250,22 +248,21 @@ def _other_drives(
     }
 
 
-def _ignored_where_drive_noise_dominates(
-    observation: Observation,
-    of_sensor: Observation,
-    noise: Mapping[tuple[str, str], FloatArray],
-    driving: Sequence[str],
+def _ignored_where_drive_noise_counts(
+    observation: Observation, noise: Mapping[tuple[str, str], FloatArray], driving: Sequence[str]
 ) -> Observation:
-    """An observation that is ignored where the noise of drives dominates and nothing stands out of it.
+    """An observation that is ignored where nothing stands out and less noise of drives would be evidence.
 
     There a simulation shows noise that the recording has not: a fit would lessen it by more damping, less
-    participation, and a frequency beyond the bands that are compared. All noise of one that drives is that of a
-    drive. Compared with the others it would count, and beside an effect on these, where it drives alone, not.
+    participation, a frequency beyond the bands that are compared, or a spring that isolates. All that it can gain
+    by that is the share of the drive's noise in each variance; together these must be less than a nat. All noise
+    of one that drives is that of a drive. Compared with the others it would count, and beside an effect on these,
+    where it drives alone, not.
     """
-    is_noise = (observation.channel in driving) | np.asarray(
-        noise.get((observation.run.name, observation.channel), 0.0) > _DOMINANT_NOISE_RATIO * of_sensor.variance
-    )
-    ignored = is_noise & ~observation.informative
+    is_plain = ~observation.informative
+    share = noise.get((observation.run.name, observation.channel), 0.0) / observation.variance
+    is_noise = (observation.channel in driving) | np.asarray(share * is_plain.sum() > 2.0 * TEMPERING)
+    ignored = is_noise & is_plain
     variance = np.where(ignored, IGNORED_VARIANCE, 1.0) * observation.variance
     return replace(observation, variance=variance, ignored=ignored)
 

@@ -11,11 +11,13 @@ from recorded_oscillators import DAMPING, MASS_KG, OMEGA, RATE_HZ, rig, run_of
 
 from sloshlab.identification.case import Case, CaseRun
 from sloshlab.identification.drive_noise import WHITE, NoiseSpectrum
-from sloshlab.identification.free_run_problem import FreeRunFit
+from sloshlab.identification.free_run_problem import TEMPERING, FreeRunFit
 from sloshlab.identification.noise_floor import (
-    _ignored_where_drive_noise_dominates,
+    _ignored_where_drive_noise_counts,
     _over_bands_of_a_resonance,
     _propagated_noise,
+    _shared,
+    _steady,
     _with_noise_of_drive,
     weighted_observations,
 )
@@ -129,28 +131,46 @@ def test_noise_of_a_resonance_may_lie_where_the_resonance_may() -> None:
     assert _over_bands_of_a_resonance(burst)[:, 30].tolist() == [0.0] * 16 + [1.0] * 9 + [0.0] * 15
 
 
+def test_channels_share_all_of_the_noise_of_a_drive_that_is_added_to_them() -> None:
+    """Variances get more than a draw has where a resonance may be elsewhere; what drives shares nothing."""
+    generator = np.random.default_rng(3)
+    force, root = ("driven", "force_interface"), ("driven", "acceleration_root")
+    drawn = {place: generator.standard_normal((4, 40, 100)) * np.arange(1.0, 101.0) for place in (force, root)}
+    added = {place: _over_bands_of_a_resonance(np.mean(draws**2, axis=0)) for place, draws in drawn.items()}
+    shared = _shared(drawn, added, (root[1],))
+    np.testing.assert_allclose(_steady(shared[force] ** 2).mean(), added[force].mean(), rtol=0.02)
+    assert _steady(drawn[force] ** 2).mean() < 0.8 * added[force].mean()
+    assert not shared[root].any()
+    correlation = np.corrcoef(shared[force].ravel(), drawn[force].ravel())[0, 1]
+    assert correlation > 0.99
+
+
 def test_what_is_noise_of_the_drive_alone_counts_for_nothing() -> None:
+    """Unless a model that passes none of it would gain less than a nat by it over the whole channel."""
     run = quiet_run(8.0)
     [rests] = observations(run, ["acceleration_tip"])
     sensor, place = rests.variance, ("quiet", "acceleration_tip")
+    one_nat = 2 * TEMPERING / sensor.size
 
     def counts_for_less(observation: Observation, share: float, driving: tuple[str, ...] = ()) -> bool:
         noise = {place: share * sensor}
         noisier = _with_noise_of_drive(observation, noise, ())
         np.testing.assert_allclose(noisier.variance, (1 + share) * sensor)
-        weighed = _ignored_where_drive_noise_dominates(noisier, observation, noise, driving)
+        weighed = _ignored_where_drive_noise_counts(noisier, noise, driving)
         [factor] = np.unique((weighed.variance / noisier.variance).round(6))
         assert factor in (1.0, 100.0)
         return bool(factor > 1.0)
 
+    assert 0 < one_nat < 0.1
     assert counts_for_less(rests, 3.0)
-    assert not counts_for_less(rests, 0.5)
+    assert counts_for_less(rests, 2.0 * one_nat)
+    assert not counts_for_less(rests, 0.5 * one_nat)
     assert not counts_for_less(replace(rests, spectra=rests.spectra + 10 * np.sqrt(sensor)), 3.0)
     assert not counts_for_less(replace(rests, simulated=np.full(sensor.shape, 10 * np.sqrt(sensor.max()))), 3.0)
-    np.testing.assert_array_equal(_ignored_where_drive_noise_dominates(rests, rests, {}, ()).variance, sensor)
+    np.testing.assert_array_equal(_ignored_where_drive_noise_counts(rests, {}, ()).variance, sensor)
     # of what drives all noise is that of a drive, however small what the others add to it
     assert counts_for_less(rests, 0.0, ("acceleration_tip",))
-    assert not counts_for_less(rests, 0.5, ("acceleration_root",))
+    assert not counts_for_less(rests, 0.5 * one_nat, ("acceleration_root",))
     moving = replace(rests, spectra=rests.spectra + 10 * np.sqrt(sensor))
     assert not counts_for_less(moving, 0.0, ("acceleration_tip",))
 
