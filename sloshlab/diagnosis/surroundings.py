@@ -78,14 +78,17 @@ def surroundings_of(problem: FreeRunProblem, fit: FreeRunFit, rig: Rig | None) -
 
 
 def _update_rates(fitting: Sequence[Sequence[Observation]], frequency_hz: float) -> dict[str, tuple[float, ...]]:
-    """Compared channels that look held, in the run that shows it first, and rates of their updates."""
-    found: dict[str, tuple[float, ...]] = {}
+    """Compared channels that look held, and rates of their updates."""
+    recorded: dict[tuple[str, float], list[FloatArray]] = {}
     for observation in (observation for run in fitting for observation in run):
-        rate = observation.run.attributes.sampling_rate_hz
+        key = observation.channel, observation.run.attributes.sampling_rate_hz
         values = np.asarray(observation.run.recording[observation.channel].values, np.float64)
+        recorded.setdefault(key, []).append(values)
+    found: dict[str, tuple[float, ...]] = {}
+    for (channel, rate_hz), recordings in recorded.items():
         # a line at twice the frequency is the motion's own
-        if rates := update_rates_hz(values, rate, 2.5 * frequency_hz):
-            found.setdefault(observation.channel, rates)
+        if rates := update_rates_hz(recordings, rate_hz, 2.5 * frequency_hz):
+            found.setdefault(channel, rates)
     return found
 
 

@@ -42,7 +42,7 @@ FITTED = tuple[FreeRunProblem, Candidate]
 def problem_of(folder: Path, runs: Sequence[CaseRun], key: str, free: Sequence[str]) -> FITTED:
     """One candidate as the recordings offer it; of the baseline releases are free and what is named."""
     model = RigModel(rig(folder), folder, runs)
-    rates = {TIP: update_rates_hz(runs[0].recording[TIP].values, RATE_HZ, 16.0)}
+    rates = {TIP: update_rates_hz([runs[0].recording[TIP].values], RATE_HZ, 16.0)}
     at = replace(
         surroundings(model),
         runs=tuple(run.name for run in runs),

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from recorded_oscillators import decays, driven, effect, rig, surroundings
+from scipy.signal import butter, sosfilt
 
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_physics import effects
@@ -241,7 +242,7 @@ def test_a_held_reading_is_told_to_a_part_of_a_sample(
 @pytest.mark.parametrize("update_rate_hz", [61.7, 143.3, 200.0])
 def test_the_rate_of_updates_is_read_from_a_noisy_recording(update_rate_hz: float) -> None:
     noise = 0.01 * AMPLITUDE * np.random.default_rng(3).standard_normal(N)
-    found = update_rates_hz(held(update_rate_hz, 0.4, wave) + noise, RATE, 20.0)
+    found = update_rates_hz([held(update_rate_hz, 0.4, wave) + noise], RATE, 20.0)
     # a tenth of an update over the run
     assert min(abs(rate - update_rate_hz) for rate in found) < 0.1 * RATE / N
 
@@ -259,7 +260,7 @@ def test_the_rate_is_read_beside_lines_of_the_motion(noise: float) -> None:
     updates = (np.floor(time * update_rate_hz - 0.3) + 0.3) / update_rate_hz
     own = noise * np.random.default_rng(3).standard_normal(N)
     signal = [np.sin(2 * np.pi * motion_hz * at) + own for at in (updates, time)]
-    found, of_none = (update_rates_hz(each, sampling_rate_hz, 2.5 * motion_hz) for each in signal)
+    found, of_none = (update_rates_hz([each], sampling_rate_hz, 2.5 * motion_hz) for each in signal)
     assert min((abs(rate - update_rate_hz) for rate in found), default=np.inf) < 0.1 * sampling_rate_hz / N
     assert of_none == ()
 
@@ -267,8 +268,26 @@ def test_the_rate_is_read_beside_lines_of_the_motion(noise: float) -> None:
 @pytest.mark.parametrize("noise", [1e-3, 0.01, 0.1])
 def test_a_reading_that_is_not_held_has_no_rate(noise: float) -> None:
     generator = np.random.default_rng(4)
-    found = [update_rates_hz(SIGNAL + noise * generator.standard_normal(N), RATE, 20.0) for _ in range(20)]
+    found = [update_rates_hz([SIGNAL + noise * generator.standard_normal(N)], RATE, 20.0) for _ in range(20)]
     assert found.count(()) == 20
+
+
+def test_the_rate_is_read_behind_the_filter_of_a_recorder_from_several_decays() -> None:
+    """Steps of a decay are largest in its first cycle, a filter at a third of the sampling rate rounds them."""
+    sampling_rate_hz, update_rate_hz, motion_hz = 1024.0, 421.15, 11.0
+    filter_ = butter(2, 0.35, fs=1.0, output="sos")
+    generator, time = np.random.default_rng(5), np.arange(4096) / sampling_rate_hz
+
+    def recorded(at: np.ndarray) -> np.ndarray:
+        decay = 20.0 * np.exp(-0.8 * at) * np.cos(2 * np.pi * motion_hz * at)
+        return np.asarray(sosfilt(filter_, decay) + 0.05 * generator.standard_normal(time.size))
+
+    shares = (0.0, 0.2, 0.4, 0.6)
+    recordings = [recorded((np.floor(time * update_rate_hz - each) + each) / update_rate_hz) for each in shares]
+    found = update_rates_hz(recordings, sampling_rate_hz, 2.5 * motion_hz)
+    assert min((abs(rate - update_rate_hz) for rate in found), default=np.inf) < 0.1 * sampling_rate_hz / 4096
+    assert update_rates_hz([recorded(time) for _ in shares], sampling_rate_hz, 2.5 * motion_hz) == ()
+    assert update_rates_hz(recordings, sampling_rate_hz, 0.6 * sampling_rate_hz) == ()
 
 
 def test_a_hold_is_sought_where_a_recording_shows_one(model: RigModel) -> None:
