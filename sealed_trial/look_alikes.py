@@ -58,9 +58,9 @@ LOOK_ALIKES: Final = (
         ("shaker_one_frequency",),
     ),
     LookAlike(
-        HiddenEffect("mass_error", "tank", tank_effects.mass, ("shaker",)),
+        HiddenEffect("mass_error", "tank", tank_effects.mass, ("sdof", "shaker")),
         (("mass_error",), ("effective_mass",), ("sensor_gain",)),
-        ("shaker_one_frequency",),
+        ("sdof_decays", "sdof_one_frequency", "shaker_one_frequency"),
     ),
 )
 
