@@ -86,7 +86,7 @@ def _up_to_the_peak(at: Surroundings) -> Mapping[str, tuple[float, float]]:
 
 _SATURATION: Final = (
     EffectParameter("limit", 1e-12, 1e12, range=Range(0.05, 1.0, scales.peak, is_log=False)),
-    EffectParameter("dead_zone", 0.0, 1e12, range=Range(1e-3, 0.5, scales.peak)),
+    EffectParameter("dead_zone", 0.0, 1e12, range=Range(0.0, 0.5, scales.peak, is_log=False)),
 )
 # In the unit of the channel that drives, which is read before the actuator and not behind it.
 SATURATION = register(
