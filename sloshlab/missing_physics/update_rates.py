@@ -34,7 +34,9 @@ def _squared_differences(values: FloatArray, sampling_rate_hz: float, rate_hz: f
     """
     second = np.diff(values, 2) ** 2
     known = np.isfinite(second)
-    n = max(_FEWEST_SAMPLES, round(_UPDATES_IN_A_NEIGHBOURHOOD * sampling_rate_hz / rate_hz))
+    # what hardly moves has no frequency to begin from
+    slowest_hz = max(rate_hz, sampling_rate_hz / values.size)
+    n = max(_FEWEST_SAMPLES, round(_UPDATES_IN_A_NEIGHBOURHOOD * sampling_rate_hz / slowest_hz))
     sums, counts = (
         uniform_filter1d(each, n, mode="nearest") for each in (np.where(known, second, 0.0), 1.0 * known)
     )

@@ -15,6 +15,7 @@ from recorded_oscillators import (
     surroundings,
 )
 
+from sloshlab.diagnosis.selection import fitted_runs
 from sloshlab.diagnosis.selection.fitted_runs import _refined, places_in_runs, values_of_runs
 from sloshlab.identification.free_run_problem import FreeRunFit, FreeRunProblem
 from sloshlab.identification.observations import observations
@@ -263,8 +264,13 @@ def test_an_instant_has_six_places_in_a_period_of_the_motion(pulsed: RigModel) -
     )
 
 
-def test_the_instant_of_pulses_is_found_in_a_run_that_was_not_fitted(pulsed: RigModel) -> None:
-    """From the start of the run no step leads to a pulse that is many widths away."""
+@pytest.mark.parametrize("is_shown", [True, False])
+def test_the_instant_of_pulses_is_found_in_a_run_that_was_not_fitted(
+    pulsed: RigModel, monkeypatch: pytest.MonkeyPatch, is_shown: bool
+) -> None:
+    """From the start of the run no step leads to a pulse many widths away; by draws where no force is known."""
+    if not is_shown:
+        monkeypatch.setattr(fitted_runs, "latent_forces", lambda *_: {})
     train = Candidate(effect("structure.external_force").of_runs(("first", "second")), of_runs(pulsed))
     key = train.key
     _, second = (observations(run, pulsed.compared(run)) for run in pulsed.runs)

@@ -290,6 +290,8 @@ def test_the_rate_is_read_behind_the_filter_of_a_recorder_from_several_decays() 
     assert [update_rates_hz([each], sampling_rate_hz, 2.5 * motion_hz) for each in recordings] == [()] * 4
     assert update_rates_hz([recorded(time) for _ in shares], sampling_rate_hz, 2.5 * motion_hz) == ()
     assert update_rates_hz(recordings, sampling_rate_hz, 0.6 * sampling_rate_hz) == ()
+    # a run at rest has no motion by which the slowest rate is known
+    assert update_rates_hz([np.zeros(time.size)], sampling_rate_hz, 0.0) == ()
 
 
 def test_a_hold_is_sought_where_a_recording_shows_one(model: RigModel) -> None:
