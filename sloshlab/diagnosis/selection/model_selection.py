@@ -22,6 +22,7 @@ from sloshlab.diagnosis.selection.hidden_effects import hidden_effects
 from sloshlab.diagnosis.selection.known_fits import N_KEPT, KnownFits
 from sloshlab.diagnosis.selection.nested_models import keys_of, own_numbers, reduced, widened, without
 from sloshlab.diagnosis.selection.successive_halving import STEPS_OF_A_RUNG
+from sloshlab.identification.baseline_parameter import prior_cost
 from sloshlab.identification.free_run_fit import INFLATION_STAGES, fitted
 from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.missing_force.latent_force import STRUCTURE, TANK
@@ -73,7 +74,7 @@ class ModelSelection:
         if self.known.remains(retuned):
             self.growth.added([self._as_believed(), retuned], "one effect", retuned)
             self.known.renew_sampling()
-        elif not self._uncovered(retuned):
+        elif not any([self._uncovered(retuned), self._beside_belief(retuned)]):
             return self.known.in_order()
         # Forward as far as something is left, before effort goes into models that leave it; then each length.
         reached = 0
@@ -271,11 +272,33 @@ class ModelSelection:
                 [rest, believed], f"refining {effect.key}", [effect], {effect.key: [numbers, *places]}
             )
 
+    def _beside_belief(self, retuned: FreeRunFit) -> bool:
+        """Effects beside a baseline whose least probable numbers are as believed again, the others retuned.
+
+        Beside a liquid that retuning has left without damping nothing shows that changes this damping. Only
+        numbers less probable where retuning has taken them than an effect would be are put back. Returns whether
+        an effect is more probable than the retuned baseline.
+        """
+        problem = self.known.runs.problem_of(retuned)
+        costs = prior_cost(problem.theta_of(retuned.values)[: problem.n_baseline])
+        is_refuted = costs > 2.0 * self._price_of_one_more(retuned)
+        refuted = [name for name, far in zip(problem.names, is_refuted, strict=False) if far]
+        if not refuted:
+            return False
+        believed = self.known.runs.model.believed
+        base = replace(retuned, values={**retuned.values, **{name: believed[name] for name in refuted}})
+        self.growth.grown([base], f"beside {', '.join(refuted)} as believed")
+        return self.known.is_more_probable(self.known.of_length(1), retuned)
+
+    def _price_of_one_more(self, fit: FreeRunFit) -> float:
+        """Nats by which a model with one more effect is less probable before anything was recorded."""
+        n, pool = len(fit.candidates), len(self.growth.pool)
+        return log_prior(n, pool) - log_prior(n + 1, pool)
+
     def _uncovered(self, fit: FreeRunFit) -> bool:
         """Effects that baseline or noise hide beside a fit which leaves nothing; whether one is more probable."""
         self.said("hidden effects", 0, 1)
-        n, pool = len(fit.candidates), len(self.growth.pool)
-        least = log_prior(n, pool) - log_prior(n + 1, pool)
+        least = self._price_of_one_more(fit)
         beside = hidden_effects(self.known.runs, fit, self.growth.pool_beside([fit]), least)
         hidden = [each for each in beside if each.gain > least]
         starts = [FreeRunFit((*fit.candidates, each.candidate), each.values, 0.0, 0.0) for each in hidden]

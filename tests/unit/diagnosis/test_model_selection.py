@@ -208,3 +208,30 @@ def test_a_hidden_effect_is_fitted_from_afar_as_well(tmp_path: Path, monkeypatch
     selection._swapped_beside = {}
     assert selection._uncovered(FreeRunFit((), {}, 50.0, 50.0))
     assert sorted(each.values[number] for each in kept) == [-1.5, -0.4]
+
+
+@pytest.mark.parametrize("tolerances", [0.5, 3.9])
+def test_a_number_that_retuning_has_taken_too_far_is_as_believed_beside_an_effect(
+    tmp_path: Path, tolerances: float
+) -> None:
+    """Beside a damping that is nearly gone nothing shows that changes it; a frequency that moved little stays."""
+    model = RigModel(rig(tmp_path), tmp_path, decays())
+    runs = FittedRuns(model, [observations(run, model.compared(run)) for run in model.runs], [])
+    selection = cast(Any, ModelSelection(runs, surroundings(model), lambda what, done, of: None))
+    frequency, damping = "frequency of mode 1", "damping of mode 1"
+    problem = runs.problem()
+    far = problem.theta_of(model.believed)
+    far[problem.names.index(damping)] -= tolerances
+    far[problem.names.index(frequency)] += 0.5
+    retuned = FreeRunFit((), {**model.believed, **problem.values(far)}, 50.0, 50.0)
+    grown: list[FreeRunFit] = []
+    selection.growth = SimpleNamespace(
+        pool=selection.growth.pool, grown=lambda bases, what: grown.extend(bases) or selection.known.keep([better])
+    )
+    force = Candidate(effect("structure.constant_force"), surroundings(model))
+    better = FreeRunFit((force,), {"structure.constant_force.force_n": 1.0}, 1.0, 1.0)
+    selection.known.is_more_probable = lambda found, fit: found == [better] and fit is retuned
+    assert selection._beside_belief(retuned) is (tolerances > 1.0)
+    if grown:
+        assert grown[0].values[damping] == model.believed[damping]
+        assert grown[0].values[frequency] == retuned.values[frequency] != model.believed[frequency]
