@@ -18,7 +18,7 @@ from sloshlab.errors import AnalysisError, SloshlabError
 from sloshlab.identification.case import CaseRun
 from sloshlab.identification.diagnosed_model import Readings, Request
 from sloshlab.identification.integration_steps import STEPS_PER_PERIOD, steps_per_sample
-from sloshlab.identification.release import AVERAGING, INSTANT, late_by
+from sloshlab.identification.release import AVERAGING, INSTANT, late_by, samples_disturbed
 from sloshlab.identification.rig_parameters import (
     FLUCTUATION,
     RELEASE,
@@ -62,13 +62,31 @@ _MOST_BYTES_AT_ONCE: Final = 2e8
 
 @dataclass(frozen=True, eq=False)
 class _Channels:
-    """Channels of a run, kept since every simulation needs them."""
+    """Channels of a run, kept since every simulation needs them.
+
+    Attributes
+    ----------
+    compared : tuple of str
+    attributes : dict
+    recorded : dict of str to ndarray
+        Where they are compared, else NaN.
+    driving : dict of str to ndarray
+    n_cells : int
+    """
 
     compared: tuple[str, ...]
     attributes: Mapping[str, Mapping[str, Any]]
     recorded: Mapping[str, FloatArray]
     driving: Mapping[str, FloatArray]
     n_cells: int
+
+
+def _as_compared(run: CaseRun, name: str) -> FloatArray:
+    """A recorded channel; NaN where a release may be, which tells a sensor's charge as little as anything else."""
+    values = np.array(run.recording[name].values, np.float64)
+    if run.is_free:
+        values[: samples_disturbed(run.attributes.sampling_rate_hz)] = np.nan
+    return values
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,7 +214,7 @@ class RigModel:
         return _Channels(
             tuple(names),
             {name: dict(run.recording[name].attrs) for name in names},
-            {name: np.asarray(run.recording[name].values, np.float64) for name in names},
+            {name: _as_compared(run, name) for name in names},
             {
                 name: np.asarray(run.recording[name].values, np.float64)
                 for name in self.driving(run)

@@ -107,10 +107,42 @@ class ForceMatching:
         self._ways = [_Way(force) for force in forces]
         self._halved = [_Way(force, 0.5) for force in forces]
         self._shown = [ShownForces(forces, [forces]), *([] if undivided is None else [undivided])]
-        missing = np.concatenate([shown.missing for shown in self._shown])
-        self.power = float(missing @ missing)
         self.is_more_than_noise = any(shown.is_more_than_noise for shown in self._shown)
         self._noise = sum(shown.noise for shown in self._shown)
+        self._match_to(np.concatenate([shown.missing for shown in self._shown]))
+
+    @classmethod
+    def of_effect(
+        cls, forces: Sequence[LatentForce], candidate: Candidate, numbers: Numbers, effort: Effort | None = None
+    ) -> ForceMatching | None:
+        """The force that an effect makes along these motions in the place of the missing one, whole.
+
+        Parameters
+        ----------
+        forces : sequence of LatentForce
+            What is left of the missing ones beside the effect.
+        candidate : Candidate
+        numbers : mapping
+            Named as in a fit.
+        effort : Effort, optional
+
+        Returns
+        -------
+        ForceMatching or None
+            None of what is no force that a motion makes.
+        """
+        found = cls(forces, effort=effort)
+        found._shown = [ShownForces(forces, [])]
+        if force_alone(candidate, numbers) is None:
+            return None
+        [force] = found._forces(candidate, [numbers])
+        if force is None or not force.any():
+            return None
+        found._match_to(force * found._scale)
+        return found
+
+    def _match_to(self, missing: FloatArray) -> None:
+        self.power = float(missing @ missing)
         self._scale = max(float(np.sqrt(np.mean(missing**2))), 1e-300)
         self._missing = missing / self._scale
 

@@ -28,7 +28,7 @@ class ShownForces:
     forces : sequence of LatentForce
         One per run.
     moved : sequence of sequences of LatentForce
-        Of every place at which the baseline may be off, one per run.
+        Of every place at which the baseline may be off, one per run; none where it is as it should be.
 
     Attributes
     ----------
@@ -43,14 +43,7 @@ class ShownForces:
 
     def __init__(self, forces: Sequence[LatentForce], moved: Sequence[Sequence[LatentForce]]) -> None:
         self.whiteners = [Whitener(force) for force in forces]
-        of_runs = []
-        for whitener, *places in zip(self.whiteners, *moved, strict=True):
-            motions = [np.concatenate([place.motion_before, place.motion]) for place in places]
-            columns = [*(column for motion in motions for column in motion.T), np.ones(len(motions[0]))]
-            of_runs.append(np.stack([whitener.whitened(column) for column in columns], axis=1))
-        linear = np.concatenate(of_runs)
-        # Both places move alike where the base does not.
-        self._linear = orth(linear / np.maximum(np.abs(linear).max(axis=0), 1e-300))
+        self._linear = _linear(self.whiteners, moved)
         known = zip(forces, self.whiteners, strict=True)
         self.missing = self._without_linear(
             np.concatenate([whitener.of_regularised(force.force_n) for force, whitener in known])
@@ -75,6 +68,22 @@ class ShownForces:
 
     def _without_linear(self, series: FloatArray) -> FloatArray:
         return np.asarray(series - self._linear @ (self._linear.T @ series))
+
+
+def _linear(whiteners: Sequence[Whitener], moved: Sequence[Sequence[LatentForce]]) -> FloatArray:
+    """Orthonormal columns of what is linear in the motion of some places, the same in all runs, and of a constant
+    force.
+    """
+    if not moved:
+        return np.empty((sum(whitener.n_values for whitener in whiteners), 0))
+    of_runs = []
+    for whitener, *places in zip(whiteners, *moved, strict=True):
+        motions = [np.concatenate([place.motion_before, place.motion]) for place in places]
+        columns = [*(column for motion in motions for column in motion.T), np.ones(len(motions[0]))]
+        of_runs.append(np.stack([whitener.whitened(column) for column in columns], axis=1))
+    linear = np.concatenate(of_runs)
+    # Both places move alike where the base does not.
+    return np.asarray(orth(linear / np.maximum(np.abs(linear).max(axis=0), 1e-300)))
 
 
 class Whitener:

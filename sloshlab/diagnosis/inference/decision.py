@@ -4,8 +4,8 @@
   together is said as a set.
 - Of a set all of whose models have one of them in common that one is named (Barbieri and Berger 2004,
   doi:10.1214/009053604000000238); whether more is missing cannot be told.
-- Two models that predict the same within `TOLD_APART` are equals; of one that needs more numbers for
-  it only the simpler one is said.
+- Two models that predict the same within `TOLD_APART`, at baselines as probable, are equals; of one that needs
+  more numbers for it only the simpler one is said.
 - An effect or a remainder below `LEAST_STRENGTH` is not worth a word: it counts as nothing.
 - A name may leave `LAW` of the amplitude that lacks without it; more is a remainder.
 - The place of what has no name needs `LOCATED`.
@@ -92,7 +92,7 @@ def _unknown(found: Posterior, nearest: str, stated: dict[str, float]) -> Decisi
 
 
 def equals_of(best: ScoredModel, found: Posterior) -> list[ScoredModel]:
-    """Models of no more numbers that predict the same as the best within what recordings tell apart.
+    """Models of no more numbers that predict the same as the best within what recordings and beliefs tell apart.
 
     Parameters
     ----------
@@ -106,6 +106,7 @@ def equals_of(best: ScoredModel, found: Posterior) -> list[ScoredModel]:
         if model.names != best.names
         and model.n_numbers <= best.n_numbers
         and not set(best.keys) < set(model.keys)
-        and difference(best, model) / found.tempering < TOLD_APART
+        # Beliefs are readings, too.
+        and difference(best, model) / found.tempering + model.cost_of_baseline - best.cost_of_baseline < TOLD_APART
     ]
     return sorted(alike, key=lambda model: -model.evidence)

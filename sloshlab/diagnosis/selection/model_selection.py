@@ -14,6 +14,7 @@ import numpy as np
 from scipy.stats import norm, qmc
 
 from sloshlab.diagnosis.inference.posterior import log_prior
+from sloshlab.diagnosis.selection.equal_forces import equal_forces
 from sloshlab.diagnosis.selection.explained_scatter import ExplainedScatter
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
 from sloshlab.diagnosis.selection.forward_growth import ForwardGrowth, Said
@@ -86,6 +87,7 @@ class ModelSelection:
         for n in range(1, _MOST_EFFECTS + 1):
             if any(self.known.may_win(fit) for fit in self.known.of_length(n)[:1]):
                 self._swapped(n)
+                self._with_equal_forces(n)
         # What came up beside an effect may need none beside it.
         for n in range(_MOST_EFFECTS, 0, -1):
             self._simplified(n)
@@ -188,7 +190,7 @@ class ModelSelection:
             return
         if self.known.remains(best):
             self._refined(best)
-        elif n < _MOST_EFFECTS and self._uncovered(best):
+        elif n < _MOST_EFFECTS and self.known.has_budget() and self._uncovered(best):
             self._simplified(n + 1)
 
     def _swapped(self, n: int) -> None:
@@ -209,6 +211,24 @@ class ModelSelection:
             matched = None if fitted_rest is None else self.growth.matched_beside(fitted_rest, what)
             self.growth.grown([rest], what, matched=matched, against=effect)
             compared |= {keys for keys in self.known.models if len(keys) == n and others < keys}
+
+    def _with_equal_forces(self, n: int) -> None:
+        """What makes the same force in the place of an effect of the best of so many, if it leaves nothing."""
+        best = self.known.best_of(n)
+        if best is None or self.known.remains(best):
+            return
+        begun = [
+            FreeRunFit((*rest.candidates, other), {**rest.values, **numbers}, 0.0, 0.0)
+            for effect in best.candidates
+            for rest in [without(best, effect)]
+            for other, numbers in equal_forces(
+                self.known.runs.one_repeat_per_test, best, effect, self.growth.pool, N_KEPT
+            )
+        ]
+        near = [fit for fit in self._few_steps_on(begun) if not fit.trouble and self.known.may_win(fit)]
+        known = [self.known.of_model(keys_of(fit.candidates)) for fit in near]
+        news = [fit for fit, old in zip(near, known, strict=True) if old is None or fit.cost < old.cost]
+        self.known.keep(self.growth.fitted_to_the_end(news, best))
 
     def _simplified(self, n: int) -> None:
         """Models nested in the leading ones of so many: with one effect less, or with what one reduces to.

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Final
 
+import numpy as np
+
 from sloshlab.missing_physics.candidate import (
     Effect,
     EffectParameter,
+    MissingForces,
     Numbers,
     Surroundings,
     multiples,
@@ -78,6 +81,7 @@ def force_effect(
     reduces_to: tuple[str, ...] = (),
     corrects: str = "",
     size: tuple[str, ...] = (),
+    limits: tuple[str, ...] = (),
 ) -> Effect:
     """Register a force of the twin as an effect.
 
@@ -99,6 +103,8 @@ def force_effect(
         Narrower ones than those of the kind.
     separated_by, needs, spoken_for_by, variant_of, reduces_to, corrects, size
         As of `Effect`.
+    limits : tuple of str, optional
+        Numbers that the force does not exceed in either direction: the missing force shows their mean.
 
     Examples
     --------
@@ -123,13 +129,14 @@ def force_effect(
         for parameter in kind.parameters
         if not fitted or parameter.name in fitted
     )
+    begun = starts if callable(starts) else multiples(parameters, *starts)
     return register(
         Effect(
             name or kind.name,
             block,
             kind.equation,
             parameters,
-            starts if callable(starts) else multiples(parameters, *starts),
+            begun,
             extension,
             separated_by,
             needs or (has_structure if block == "structure" else lambda surroundings: True),
@@ -138,5 +145,27 @@ def force_effect(
             reduces_to=reduces_to,
             corrects=corrects,
             size=size,
+            proposes=_at_its_limits(begun, limits),
         )
     )
+
+
+def _at_its_limits(
+    starts: Callable[[Surroundings], Iterable[Numbers]], limits: tuple[str, ...]
+) -> Callable[[Surroundings, MissingForces, Numbers], Iterable[Numbers]]:
+    """Starts whose limits have in mean the size of the missing force where it is largest most of the time.
+
+    Friction that slides is at its limit. Where it holds it is less, and along a recorded motion that has stopped
+    the noise of the velocity says nothing of it.
+    """
+
+    def proposed(at: Surroundings, missing: MissingForces, known: Numbers) -> list[Numbers]:
+        del known
+        sizes = [np.abs(force.force_n[force.force_n != 0.0]) for force in missing.values()]
+        limit = max((float(np.median(size)) for size in sizes if size.size), default=0.0)
+        if not limits or limit <= 0.0:
+            return []
+        means = [(start, float(np.mean([start[name] for name in limits]))) for start in starts(at)]
+        return [{**start, **{name: start[name] * limit / mean for name in limits}} for start, mean in means]
+
+    return proposed

@@ -85,6 +85,7 @@ COULOMB = force_effect(
     ranges={"force_n": _FRICTION},
     separated_by=_OTHER_LEVELS + ", down to rest",
     spoken_for_by=COULOMB_CHARACTER,
+    limits=("force_n",),
 )
 
 # The same force as dry friction of (F₊ + F₋)/2 with a constant force of (F₋ − F₊)/2, whatever is recorded.
@@ -96,6 +97,7 @@ ASYMMETRIC = force_effect(
     separated_by="none: the two are the same force; measure the static rest position with the friction taken off",
     spoken_for_by=(DISSIPATIVE, ODD_IN_VELOCITY, STATE_FUNCTION, RATE_INDEPENDENT, WORK_1, NO_ONSET, CONSTANT),
     reduces_to=("coulomb_friction",),
+    limits=("force_up_n", "force_down_n"),
 )
 # Where friction falls with the speed over all of the motion, what it takes away is what a damper adds: then it
 # cannot be told from Coulomb friction and a damper.
@@ -112,6 +114,7 @@ STRIBECK = force_effect(
     separated_by="slow motion about the Stribeck velocity",
     spoken_for_by=(DISSIPATIVE, ODD_IN_VELOCITY, STATE_FUNCTION, NO_ONSET, THIRD_ORDER),
     reduces_to=("coulomb_friction",),
+    limits=("coulomb_n", "static_n"),
 )
 DRAG = force_effect(
     QUADRATIC_DRAG,
@@ -196,6 +199,7 @@ BEHIND_PLAY = force_effect(
     separated_by="slow reversals at several amplitudes, with the force read while it is low",
     spoken_for_by=(DISSIPATIVE, MEMORY, RATE_INDEPENDENT),
     reduces_to=("coulomb_friction",),
+    limits=("force_n",),
 )
 # A constant force is nested in it: it moves the middle of the loop by (F₋ − F₊)/2 as long as the slider follows.
 BEHIND_PLAY_BY_DIRECTION = force_effect(
@@ -215,6 +219,7 @@ BEHIND_PLAY_BY_DIRECTION = force_effect(
     spoken_for_by=(DISSIPATIVE, MEMORY, RATE_INDEPENDENT, CONSTANT),
     variant_of="friction_behind_play",
     reduces_to=("friction_behind_play", "asymmetric_friction", "coulomb_friction"),
+    limits=("force_up_n", "force_down_n"),
 )
 CUBIC = force_effect(
     CUBIC_STIFFNESS,

@@ -77,6 +77,7 @@ COULOMB = force_effect(
     ranges={"force_n": Range(*_SHARE_OF_LIQUID, scales.liquid_force)},
     separated_by="two or more amplitudes",
     spoken_for_by=COULOMB_CHARACTER,
+    limits=("force_n",),
 )
 DRAG = force_effect(
     QUADRATIC_DRAG,

@@ -209,6 +209,18 @@ def test_of_equals_in_two_blocks_the_structure_is_said() -> None:
     assert decided(posterior(apart, 10, 1.0)).best is apart[1]
 
 
+@pytest.mark.parametrize(("cost", "kind"), [(1.0, "indistinguishable"), (5.0, "named")])
+def test_what_needs_an_improbable_baseline_is_no_equal(cost: float, kind: str) -> None:
+    """Both predict the same; numbers of the baseline that nobody believes tell them apart as readings do."""
+    plain = model(50.0, DRAG)
+    models = [
+        model(0.0),
+        model(50.0, FRICTION),
+        replace(plain, fit=replace(plain.fit, cost=2 * TEMPERING * cost), complexity=cost),
+    ]
+    assert decided(posterior(models, 10, 1.0)).kind == kind
+
+
 def test_what_has_no_name_is_placed_only_where_one_block_has_the_evidence() -> None:
     both = {"tank": 80.0, "structure": 79.5, "sensor acceleration_tip": 10.0}
     assert decided(posterior([model(0.0, places=both)], 10, 1.0)).block == ""

@@ -7,16 +7,33 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recorded_oscillators import DAMPING, NOISE, OMEGA, RATE_HZ, decays, driven, motion, rig, run_of
+from recorded_oscillators import (
+    DAMPING,
+    NOISE,
+    OMEGA,
+    RATE_HZ,
+    decays,
+    driven,
+    effect,
+    motion,
+    rig,
+    run_of,
+    surroundings,
+)
+from scipy.signal import lfilter
 
 from sloshlab.identification import integration_steps, rig_model
 from sloshlab.identification.diagnosed_model import Request
+from sloshlab.identification.release import samples_disturbed
 from sloshlab.identification.rig_model import RigModel
+from sloshlab.missing_physics import effects
+from sloshlab.missing_physics.candidate import Candidate, extension_of
 from sloshlab.missing_physics.extension import NOTHING, Extension, SensorFault
 from sloshlab.rig import Rig
 from sloshlab.twin.rate_independent_forces import HYSTERESIS
 from sloshlab.twin.structure_forces import COULOMB_FRICTION
 
+assert effects.__all__
 TANK_DAMPING = 1.5
 STARTS_M, DURATION_S = (0.006, 0.018), 3.0
 TIP = "acceleration_tip"
@@ -93,6 +110,27 @@ def test_faults_go_by_the_clock_of_the_recording(damped: RigModel) -> None:
     read = damped.simulate(run, late, Extension(faults=(hum, leak)))
     np.testing.assert_allclose(read[TIP] - plain[TIP], mains, atol=1e-9)
     np.testing.assert_allclose(read["displacement_tank"] - plain["displacement_tank"], 0.1 * plain[TIP], atol=1e-9)
+
+
+def test_the_charge_of_a_sensor_is_not_that_of_a_release(tmp_path: Path) -> None:
+    """A filter smears the leap of a release over samples that nothing is compared with; they tell no charge."""
+    tau = 0.2
+    kept = (2 * tau * RATE_HZ - 1) / (2 * tau * RATE_HZ + 1)
+    [whole] = decays((0.012,), DURATION_S, noise={})
+    truth = whole.recording[TIP].values
+    passed = lfilter([(1 + kept) / 2, -(1 + kept) / 2], [1.0, -kept], truth)
+    passed[:3] += 2.0 * passed[:3]
+    displacement = whole.recording["displacement_tank"].values
+    run = run_of(
+        "decay_0", {"displacement_tank": displacement, TIP: passed}, NOISE, 1, initial_displacement_m=0.012
+    )
+    run.recording[TIP][:] = passed
+    model = RigModel(rig(tmp_path), tmp_path, [run])
+    high_pass = Candidate(effect("sensor.sensor_high_pass"), surroundings(model), TIP)
+    extension = extension_of((high_pass,), {f"{high_pass.key}.time_constant_s": tau})
+    read = model.simulate(run, model.believed, extension)[TIP]
+    first = samples_disturbed(RATE_HZ)
+    np.testing.assert_allclose(read[first:], passed[first:], atol=2e-3 * np.abs(truth).max())
 
 
 def participations(model: RigModel) -> list[str]:

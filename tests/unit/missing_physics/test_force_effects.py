@@ -19,7 +19,7 @@ from scipy.interpolate import CubicSpline
 
 from sloshlab.identification.rig_model import RigModel
 from sloshlab.missing_physics import effects
-from sloshlab.missing_physics.candidate import Candidate, candidates, known_effects
+from sloshlab.missing_physics.candidate import Candidate, MissingForce, candidates, known_effects
 from sloshlab.missing_physics.extension import NOTHING, Extension
 from sloshlab.rig import Rig, Structure
 from sloshlab.twin.liquid_effects import LIQUID_DAMPING
@@ -518,3 +518,36 @@ def test_a_lateral_mode_is_sought_with_the_waves_of_the_box_too(frozen: RigModel
             assert starts == []
         else:
             assert [s["tank.lateral_mode.mass_kg"] for s in starts] == [pytest.approx(expected, rel=0.06)]
+
+
+@pytest.mark.parametrize(
+    ("name", "limits"),
+    [
+        ("coulomb_friction", ("force_n",)),
+        ("asymmetric_friction", ("force_up_n", "force_down_n")),
+        ("stribeck_friction", ("coulomb_n", "static_n")),
+        ("friction_behind_play", ("force_n",)),
+    ],
+)
+def test_friction_begins_at_the_size_that_the_missing_force_has_where_it_slides(
+    frozen: RigModel, name: str, limits: tuple[str, ...]
+) -> None:
+    """In one run it holds what little pushes, in the other one it slides: ±6 N, tapered at the ends."""
+    generator, n = np.random.default_rng(1), 2000
+    slides = 6.0 * np.sign(np.sin(np.arange(n) / 20.0)) + 0.1 * generator.standard_normal(n)
+    slides[:200] = slides[-200:] = 0.0
+    missing = {"holds": MissingForce(0.3 * generator.standard_normal(n)), "slides": MissingForce(slides)}
+    friction = Candidate(effect(f"structure.{name}"), surroundings_of(frozen))
+    own = friction.starts()
+    found = friction.proposed(missing)
+    assert len(found) == len(own)
+    for start, as_shown in zip(own, found, strict=True):
+        sizes = [as_shown[f"{friction.key}.{limit}"] for limit in limits]
+        assert np.mean(sizes) == pytest.approx(6.0, rel=0.01)
+        # what tells the directions apart, and other numbers, are those of the effect's own starts
+        assert sizes[-1] / sizes[0] == pytest.approx(
+            start[f"{friction.key}.{limits[-1]}"] / start[f"{friction.key}.{limits[0]}"]
+        )
+        others = start.keys() - {f"{friction.key}.{limit}" for limit in limits}
+        assert {key: as_shown[key] for key in others} == {key: start[key] for key in others}
+    assert friction.proposed({"rest": MissingForce(np.zeros(n))}) == []
