@@ -18,7 +18,7 @@ from sloshlab.diagnosis.findings import Findings, Scoring
 from sloshlab.diagnosis.inference.scored_model import ScoredModel
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
 from sloshlab.diagnosis.selection.hidden_effects import hidden_effects
-from sloshlab.diagnosis.selection.known_fits import N_KEPT
+from sloshlab.diagnosis.selection.known_fits import N_KEPT, SEARCH
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.diagnosed_model import ModelOfBlocks
 from sloshlab.identification.free_run_fit import fitted
@@ -81,7 +81,8 @@ def found_law(found: Findings, block: str) -> FoundLaw | None:
     """The best law for the force that a block lacks beside the retuned baseline; None where none is better.
 
     One model is better than another if its evidence is more, where a law is one of as many as there are of its
-    length, and if it leaves less on the runs that chose nothing.
+    length, and if it leaves less on the runs that chose nothing. None is sought where the search of names has
+    ended at its budget: what lacks may be one of these.
 
     Parameters
     ----------
@@ -91,7 +92,7 @@ def found_law(found: Findings, block: str) -> FoundLaw | None:
     """
     places = [place for place in (STRUCTURE, TANK) if place in found.model.blocks and block in ("", place)]
     # a law is a force along one motion, which a twin of several blocks has not
-    if not found.split.has_held_out or isinstance(found.model, ModelOfBlocks):
+    if not found.split.has_held_out or isinstance(found.model, ModelOfBlocks) or SEARCH in found.failed:
         return None
     laws = [law for place in places if (law := _law_at(found, place)) is not None]
     return max(laws, key=lambda law: law.model.evidence, default=None)

@@ -30,6 +30,7 @@ from sloshlab.identification.observations import (
     within_informative_bands,
 )
 from sloshlab.identification.rig_model import RigModel
+from sloshlab.missing_physics.candidate import extension_of
 from sloshlab.missing_physics.extension import NOTHING
 
 FloatArray = NDArray[np.float64]
@@ -143,7 +144,7 @@ def _noise_of_drives(
         if run.is_free or not observed:
             continue
         spectra = {name: spectrum_of[name] for name in driving}
-        drawn = _propagated_noise(case, run, spectra, plain=plain, fit=fit)
+        drawn = _propagated_noise(model, run, spectra, observed, fit)
         added = _added_variances(observed, drawn, driving)
         draws |= _shared(drawn, added, driving)
         variances |= added
@@ -151,12 +152,77 @@ def _noise_of_drives(
             # An effect on a sensor leaves the drive to the others, against whose noise its gain must count.
             kept = [name for name in driving if name != left_out]
             others = replace(run, recording=run.recording.drop_vars(left_out))
-            drawn = _propagated_noise(case, others, {name: spectra[name] for name in kept}, plain=plain, fit=fit)
+            drawn = _propagated_noise(model, others, {name: spectra[name] for name in kept}, observed, fit)
             more = _added_variances(observed, drawn, kept)
             without.setdefault(left_out, {}).update(
                 _beside_fault(observed, added, _shared(drawn, more, kept), more, left_out)
             )
     return variances, draws, without
+
+
+def with_noise_through(
+    model: DiagnosedModel,
+    runs: Sequence[Sequence[Observation]],
+    tests: Sequence[Sequence[str]],
+    before: FreeRunFit,
+    fit: FreeRunFit,
+) -> list[list[Observation]]:
+    """Observations with what the noise of drives makes of them beside a fit, where it is more than beside another.
+
+    What is not linear in the motion makes more of it: a drag turns the slow error of an integrated velocity into
+    side bands of all that moves. Observations stay the same objects where all that a model could gain by the
+    difference is less than a nat, or where a simulation does not reach its end.
+
+    Parameters
+    ----------
+    model : DiagnosedModel
+        What the noise of its drive makes of a user's own twin is not known.
+    runs : sequence of sequences of Observation
+        Per run.
+    tests : sequence of sequences of str
+        Names of the runs of every test.
+    before : FreeRunFit
+        Beside which the noise of drives is in the observations.
+    fit : FreeRunFit
+    """
+    if not isinstance(model, RigModel):
+        return [list(run) for run in runs]
+    by_name = {run.name: run for run in model.runs}
+    grouped = [[by_name[name] for name in test if name in by_name] for test in tests]
+    found: list[list[Observation]] = []
+    for observed in runs:
+        run, driving = observed[0].run, model.driving(observed[0].run)
+        if run.is_free:
+            found.append(list(observed))
+            continue
+        spectra = {name: noise_spectrum(grouped, name) for name in driving}
+        drawn = [_propagated_noise(model, run, spectra, observed, each) for each in (before, fit)]
+        known, added = (_added_variances(observed, of_fit, driving) for of_fit in drawn)
+        draws = _shared(drawn[1], added, driving) if known and added else {}
+        found.append(
+            [
+                _with_more_noise(each, added[place] - known[place], draws[place], driving)
+                if (place := (run.name, each.channel)) in draws and place in known
+                else each
+                for each in observed
+            ]
+        )
+    return found
+
+
+def _with_more_noise(
+    observation: Observation, more: FloatArray, draws: FloatArray, driving: Sequence[str]
+) -> Observation:
+    added = _slow_factors(observation, driving) * np.maximum(more, 0.0)
+    if (added / observation.variance).sum() < 2.0 * TEMPERING:
+        return observation
+    least = observation.without_scatter
+    return replace(
+        observation,
+        variance=observation.variance + added,
+        without_scatter=None if least is None else least + added,
+        of_drive=draws,
+    )
 
 
 def _added_variances(observed: Sequence[Observation], drawn: _OfChannels, driving: Sequence[str]) -> _OfChannels:
@@ -268,25 +334,24 @@ def _ignored_where_drive_noise_counts(
 
 
 def _propagated_noise(
-    case: Case,
+    model: RigModel,
     run: CaseRun,
     driving: Mapping[str, NoiseSpectrum],
-    *,
-    plain: dict[str, list[Observation]],
+    observed: Sequence[Observation],
     fit: FreeRunFit,
-) -> dict[tuple[str, str], FloatArray]:
+) -> _OfChannels:
     """What draws of the noise of driving accelerometers add to each coefficient of the residual of every channel.
 
     A driving accelerometer that is compared, too, has its own noise in its residual beside what all of it makes of
     the simulation.
     """
-    if case.rig is None or any(run.recording[name].attrs["quantity"] != "acceleration" for name in driving):
+    if any(run.recording[name].attrs["quantity"] != "acceleration" for name in driving):
         return {}
     drawn: dict[tuple[str, str], list[FloatArray]] = {}
     with suppress(SloshlabError):
         # The recorded drive has its noise already, in a draw that nobody knows. As much noise once more changes
         # the simulation by as much, on average.
-        noise_free = _readings(case, run, fit)
+        noise_free = _readings(model, run, fit)
         # Fixed seeds: the same case gives the same answer.
         for seed in range(_N_NOISE_DRAWS):
             generator = np.random.default_rng(seed)
@@ -294,8 +359,8 @@ def _propagated_noise(
             noisier = run.recording.assign(
                 {name: run.recording[name].copy(data=run.recording[name].values + noise[name]) for name in noise}
             )
-            noisy = _readings(case, replace(run, recording=noisier), fit)
-            for observation in plain[run.name]:
+            noisy = _readings(model, replace(run, recording=noisier), fit)
+            for observation in observed:
                 name = observation.channel
                 if name in noisy and (name not in driving or len(driving) > 1):
                     added = observation.of(noise_free[name]) - observation.of(noisy[name])
@@ -328,10 +393,10 @@ def _over_bands_of_a_resonance(square: FloatArray) -> FloatArray:
     )
 
 
-def _readings(case: Case, run: CaseRun, fit: FreeRunFit) -> dict[str, FloatArray]:
-    assert case.rig is not None
+def _readings(model: RigModel, run: CaseRun, fit: FreeRunFit) -> dict[str, FloatArray]:
     # A model of its own, as drives are cached by the name of a run and this run has another drive.
-    return RigModel(case.rig, case.folder, [run]).simulate(run, fit.values, NOTHING)
+    alone = RigModel(model.rig, model.folder, [run])
+    return alone.simulate(run, fit.values, extension_of(fit.candidates, fit.values))
 
 
 def _with_inflated_variance(observed: Sequence[Observation]) -> list[Observation]:

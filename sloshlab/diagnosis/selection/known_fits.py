@@ -31,6 +31,8 @@ N_KEPT: Final = 4
 one is known that explains as much, so that the others are only compared with it."""
 _BUDGET: Final = 6e8
 """Readings that may be simulated, up to five minutes on two cores; what is begun is finished, no more is begun."""
+SEARCH: Final = "search"
+"""Under it stands why a search ended before its end."""
 LEAST_EXPLAINED: Final = 0.1
 """Of what is left beyond noise, that a force explains if a fit is to start from there, and the last effect of the
 best model if the search is to add others.
@@ -53,7 +55,7 @@ class KnownFits:
     runs : FittedRuns
         With noise by what has been found.
     failed : dict of str to str
-        Models that have no fit, and why; under "search" why it ended before its end.
+        Models that have no fit, and why; under `SEARCH` why it ended before its end.
     """
 
     def __init__(self, runs: FittedRuns, scatter: ExplainedScatter | None = None) -> None:
@@ -63,6 +65,7 @@ class KnownFits:
         self._fits: dict[frozenset[str], FreeRunFit] = {}
         self.failed: dict[str, str] = {}
         self._explaining = frozenset[str]()
+        self._driven_through = frozenset[str]()
 
     def keep(self, fits: Iterable[FreeRunFit]) -> None:
         """Add fits, of every model the one of the lowest cost.
@@ -140,7 +143,7 @@ class KnownFits:
         """Whether more may be begun; it is said in `failed` where not."""
         is_left = self.runs.effort.n_readings < _BUDGET
         if not is_left:
-            self.failed["search"] = "ended at its budget, with more effects to try"
+            self.failed[SEARCH] = "ended at its budget, with more effects to try"
         return is_left
 
     def remains(self, fit: FreeRunFit) -> bool:
@@ -296,7 +299,24 @@ class KnownFits:
         scatter, quiet, keys = self._scatter, self._quiet, keys_of(best.candidates)
         if scatter is None or keys == self._explaining or not scatter.renew(best):
             return False
-        self._explaining = keys
+        self._explaining, self._driven_through = keys, frozenset()
+        self._quiet = FittedRuns(quiet.model, scatter.fitting, quiet.tests, quiet.effort)
+        self.renew_sampling()
+        return True
+
+    def renew_noise_of_drive(self, best: FreeRunFit) -> bool:
+        """What the noise of drives makes beside a fit as noise of all; whether it is more than before.
+
+        Parameters
+        ----------
+        best : FreeRunFit
+        """
+        scatter, quiet, keys = self._scatter, self._quiet, keys_of(best.candidates)
+        if scatter is None or keys == self._driven_through:
+            return False
+        self._driven_through = keys
+        if not scatter.renew_drive(self._fits[frozenset()], best):
+            return False
         self._quiet = FittedRuns(quiet.model, scatter.fitting, quiet.tests, quiet.effort)
         self.renew_sampling()
         return True

@@ -106,7 +106,7 @@ class ModelSelection:
             best = self._best_with_wider_forms(n)
             if best is None or self.known.explains_little(n):
                 break
-            if not self.known.remains(best) and not (self._renew_scatter(best) and self.known.remains(best)):
+            if not self._remains(best) and not (self._renew_scatter(best) and self.known.remains(best)):
                 break
             if n + 1 not in self._reached:
                 self._reached.add(n + 1)
@@ -150,9 +150,20 @@ class ModelSelection:
         fits = runs.effort.spent_on(runs.model.executor, continued, begun)
         return [replace(fit, candidates=start.candidates) for start, fit in zip(begun, fits, strict=True)]
 
+    def _remains(self, best: FreeRunFit) -> bool:
+        """Whether a fit leaves something that is not what it makes of the noise of drives."""
+        if not self.known.remains(best):
+            return False
+        is_other = self._compares_anew(self.known.renew_noise_of_drive(best))
+        renewed = self.known.of_model(keys_of(best.candidates))
+        return not is_other or renewed is None or self.known.remains(renewed)
+
     def _renew_scatter(self, best: FreeRunFit) -> bool:
         """Noise by the scatter of repeats about a fit; whether it is another now."""
-        if not self.known.renew_scatter(best):
+        return self._compares_anew(self.known.renew_scatter(best))
+
+    def _compares_anew(self, is_other_noise: bool) -> bool:
+        if not is_other_noise:
             return False
         # What looked alike in the noise of before may not do so now.
         self._swapped_beside.clear()

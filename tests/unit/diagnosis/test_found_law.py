@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from recorded_oscillators import decays, rig
 from sloshlab.diagnosis import findings
 from sloshlab.diagnosis.findings import Findings, findings_of
 from sloshlab.diagnosis.found_law import FoundLaw, found_law
+from sloshlab.diagnosis.selection.known_fits import SEARCH
 from sloshlab.diagnosis.selection.model_selection import ModelSelection
 from sloshlab.diagnosis.verdict import verdict_facts, verdict_of
 from sloshlab.identification.case import Case
@@ -120,6 +122,13 @@ def test_where_nothing_is_missing_there_is_no_law(found) -> None:  # type: ignor
     everything = found(lambda t, x, v: 0.0)
     assert found_law(everything, "structure") is None
     assert found_law(everything, "sensor") is None
+
+
+def test_a_search_that_ended_at_its_budget_has_no_law(found, law_of) -> None:  # type: ignore[no-untyped-def]
+    """What lacks may have a name that was not reached."""
+    complete = found(damped_with_displacement)
+    assert law_of(damped_with_displacement) is not None
+    assert found_law(replace(complete, failed={**complete.failed, SEARCH: "ended"}), "structure") is None
 
 
 def test_a_library_holds_nothing_linear_and_nothing_twice() -> None:

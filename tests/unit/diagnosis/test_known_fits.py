@@ -128,3 +128,27 @@ def test_the_leading_fits_are_at_their_optima_in_the_noise_that_is_known_by_then
     problem = known.runs.problem_of(known.best)
     residual = problem.residual(problem.theta_of(known.best.values))
     assert known.best.misfit == pytest.approx(problem.misfit(residual), rel=1e-9)
+
+
+def test_the_noise_of_a_drive_is_renewed_once_beside_a_fit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runs = runs_of(tmp_path)
+    asked: list[FreeRunFit] = []
+
+    def renew_drive(before: FreeRunFit, fit: FreeRunFit) -> bool:
+        assert before is nothing
+        asked.append(fit)
+        return True
+
+    scatter: Any = SimpleNamespace(renew_drive=renew_drive, fitting=[["other noise"]])
+    known = KnownFits(runs, scatter)
+    renewed: list[Any] = []
+    monkeypatch.setattr(known, "renew_sampling", lambda: renewed.append(known._quiet.runs))
+    drag = Candidate(effect("structure.quadratic_drag"), surroundings(runs.model))
+    nothing, best = FreeRunFit((), {}, 100.0, 100.0), FreeRunFit((drag,), {}, 10.0, 10.0)
+    known.keep([nothing, best])
+    assert known.renew_noise_of_drive(best)
+    assert renewed == [[["other noise"]]]
+    assert not known.renew_noise_of_drive(best)
+    assert asked == [best]

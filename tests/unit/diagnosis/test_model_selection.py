@@ -235,3 +235,19 @@ def test_a_number_that_retuning_has_taken_too_far_is_as_believed_beside_an_effec
     if grown:
         assert grown[0].values[damping] == model.believed[damping]
         assert grown[0].values[frequency] == retuned.values[frequency] != model.believed[frequency]
+
+
+@pytest.mark.parametrize(("is_more", "left"), [(True, False), (False, True)])
+def test_what_a_fit_makes_of_the_noise_of_drives_is_not_left(tmp_path: Path, is_more: bool, left: bool) -> None:
+    at = surroundings(RigModel(rig(tmp_path), tmp_path, decays()))
+    drag = Candidate(effect("structure.quadratic_drag"), at)
+    best, renewed = (FreeRunFit((drag,), {}, cost, cost) for cost in (90.0, 60.0))
+    selection = cast(Any, object.__new__(ModelSelection))
+    selection._swapped_beside, selection._widened_at = {frozenset(): set()}, {}
+    selection.known = SimpleNamespace(
+        remains=lambda fit: fit is best,
+        renew_noise_of_drive=lambda fit: is_more,
+        of_model=lambda keys: renewed,
+    )
+    assert selection._remains(best) is left
+    assert bool(selection._swapped_beside) is not is_more

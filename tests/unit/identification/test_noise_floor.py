@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from recorded_oscillators import DAMPING, MASS_KG, OMEGA, RATE_HZ, rig, run_of
+from shaken_mass import CELL, LOUD, QUIET, shaken_run
+from shaken_mass import NOISE as NOISES
+from shaken_mass import case_of as shaken_case
 
+from sloshlab.conditioning.integration import DRIFT_CORNER_HZ
 from sloshlab.identification.case import Case, CaseRun
 from sloshlab.identification.drive_noise import WHITE, NoiseSpectrum
 from sloshlab.identification.free_run_problem import TEMPERING, FreeRunFit
@@ -20,10 +25,14 @@ from sloshlab.identification.noise_floor import (
     _steady,
     _with_noise_of_drive,
     weighted_observations,
+    with_noise_through,
 )
 from sloshlab.identification.observations import Observation, noise_of_sensor, observations
 from sloshlab.identification.rig_model import RigModel
+from sloshlab.missing_physics import effects
+from sloshlab.missing_physics.candidate import Candidate, known_effects
 
+assert effects.__all__
 NOISE_M_PER_S2 = 0.1
 MORE_DAMPING = 10.0
 """So that the resonance forgets within half a second, and a minute tells its noise."""
@@ -44,35 +53,73 @@ def case_of(folder: Path, *runs: CaseRun) -> Case:
 def test_noise_of_the_base_comes_through_the_resonance_as_its_closed_form_says(tmp_path: Path) -> None:
     """White noise of density S through |(1 + 2iζr)/(1 − r² + 2iζr)|² has the mean square S π f (1 + 4ζ²)/(4ζ)."""
     run = quiet_run(60.0)
-    plain = {"quiet": observations(run, ["acceleration_tip"])}
+    observed = observations(run, ["acceleration_tip"])
+    model = RigModel(rig(tmp_path), tmp_path, [run])
     fit = FreeRunFit((), {"damping of mode 1": MORE_DAMPING}, 0.0, 0.0)
-    [(place, draws)] = _propagated_noise(
-        case_of(tmp_path, run), run, {"acceleration_root": WHITE}, plain=plain, fit=fit
-    ).items()
+    [(place, draws)] = _propagated_noise(model, run, {"acceleration_root": WHITE}, observed, fit).items()
     found = np.mean(draws**2, axis=0)
     ratio = MORE_DAMPING * DAMPING / (2 * MASS_KG * OMEGA)
     density = 2 * NOISE_M_PER_S2**2 / RATE_HZ
     expected = density * np.pi * OMEGA / (2 * np.pi) * (1 + 4 * ratio**2) / (4 * ratio)
     assert place == ("quiet", "acceleration_tip")
     noisier = NoiseSpectrum(np.zeros(1), np.array([4.0]))
-    [of_louder] = _propagated_noise(
-        case_of(tmp_path, run), run, {"acceleration_root": noisier}, plain=plain, fit=fit
-    ).values()
+    [of_louder] = _propagated_noise(model, run, {"acceleration_root": noisier}, observed, fit).values()
     assert of_louder == pytest.approx(2.0 * draws)
     assert float(found.mean()) == pytest.approx(expected, rel=0.15)
-    frequencies, bands = plain["quiet"][0].frequencies_hz, found.mean(axis=0)
+    frequencies, bands = observed[0].frequencies_hz, found.mean(axis=0)
     resonance, above = (int(np.argmin(np.abs(frequencies - f))) for f in (OMEGA / (2 * np.pi), 25.0))
     assert bands[resonance] > 0.8 * bands.max() > 20 * bands[above]
 
 
+def test_a_drag_turns_the_slow_error_of_a_velocity_into_noise(tmp_path: Path) -> None:
+    """F = C |v| v beside an error δ of v is off by 2 C |v| δ; δ is the integral of white noise above the drift."""
+    drag, tone_hz, duration_s = 40.0, 10.0, 60.0
+    time = np.arange(round(duration_s * RATE_HZ)) / RATE_HZ
+    window = np.minimum(1.0, np.minimum(time, time[-1] - time))
+    run = shaken_run("tone", 3, 25.0 * window * np.sin(2 * np.pi * tone_hz * time))
+    case = shaken_case(tmp_path, [run])
+    assert case.rig is not None
+    model = RigModel(case.rig, tmp_path, [run])
+    observed = [each for each in weighted_observations(case, model)["tone"] if each.channel == CELL]
+    effects_of_tank = {f"{known.block}.{known.name}": known for known in known_effects()}
+    before = FreeRunFit((), dict(model.believed), 0.0, 0.0)
+
+    def more(name: str, number: str, value: float) -> list[Observation]:
+        added = Candidate(effects_of_tank[f"tank.{name}"], cast(Any, None))
+        values = {**model.believed, f"tank.{name}.{number}": value}
+        fit = FreeRunFit((added,), values, 0.0, 0.0)
+        [found] = with_noise_through(model, [observed], [["tone"]], before, fit)
+        return found
+
+    assert more("mass_error", "mass_kg", 1e-4)[0] is observed[0]
+    [noisier] = more("quadratic_drag", "drag_n_s2_per_m2", drag)
+    generator, low = np.random.default_rng(8), noisier.frequencies_hz < 3.0
+    speed = 25.0 * window / (2 * np.pi * tone_hz) * np.abs(np.cos(2 * np.pi * tone_hz * time))
+    frequency = np.fft.rfftfreq(time.size, 1 / RATE_HZ)
+    frequency[0] = 1e9
+    std = (NOISES[QUIET] ** -2 + NOISES[LOUD] ** -2) ** -0.5
+    energies = []
+    for _ in range(200):
+        noise = np.fft.rfft(std * generator.standard_normal(time.size))
+        error = np.fft.irfft(
+            noise / (2j * np.pi * frequency) / (1 + (DRIFT_CORNER_HZ / frequency) ** 4), time.size
+        )
+        power = np.abs(np.fft.rfft(2 * drag * speed * error)) ** 2 / time.size
+        energies.append([2 * power[1:][(frequency[1:] >= k) & (frequency[1:] < k + 1)].sum() for k in range(4)])
+    by_band = np.mean(energies, axis=0)
+    # of each band the most of itself and its neighbours
+    expected = sum(by_band[max(k - 1, 0) : k + 2].max() for k in range(3))
+    found = (noisier.variance - observed[0].variance)[:, low].sum()
+    assert found == pytest.approx(expected, rel=0.3)
+
+
 def test_a_channel_that_is_left_out_of_the_drive_is_compared_with_another_sensor(tmp_path: Path) -> None:
     run = quiet_run(4.0)
-    plain = {"quiet": observations(run, ["acceleration_tip"])}
+    observed = observations(run, ["acceleration_tip"])
     without = CaseRun(run.name, run.recording.drop_vars("acceleration_tip"), run.attributes)
     fit = FreeRunFit((), {}, 0.0, 0.0)
-    [found] = _propagated_noise(
-        case_of(tmp_path, run), without, {"acceleration_root": WHITE}, plain=plain, fit=fit
-    ).values()
+    model = RigModel(rig(tmp_path), tmp_path, [run])
+    [found] = _propagated_noise(model, without, {"acceleration_root": WHITE}, observed, fit).values()
     # Away from the tapered ends, draws of white noise as loud as the sensor: 4 × 5 × 124 of them tell 3 %.
     assert float(np.mean(found[:, 2:-2] ** 2)) == pytest.approx(NOISE_M_PER_S2**2, rel=0.08)
 
