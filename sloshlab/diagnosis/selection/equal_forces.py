@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from sloshlab.diagnosis.selection.fitted_runs import DRAWS_PER_NUMBER, FittedRuns
+from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
 from sloshlab.diagnosis.selection.missing_forces import latent_forces
 from sloshlab.diagnosis.selection.nested_models import own_numbers
 from sloshlab.identification.free_run_problem import FreeRunFit
@@ -53,8 +53,7 @@ def equal_forces(
     ]
 
     def ranked(candidate: Candidate) -> list[Match]:
-        n_draws = DRAWS_PER_NUMBER * len(candidate.effect.kinds_of_numbers)
-        return matching.ranked(candidate, [*candidate.starts(), *candidate.drawn(n_draws)[1:]])
+        return matching.ranked(candidate, candidate.starts())
 
     def refined(of: _Matched) -> list[Match]:
         return matching.refined(*of)
