@@ -16,10 +16,10 @@ from sloshlab.diagnosis.inference.posterior import Posterior, posterior
 from sloshlab.diagnosis.inference.sampled_jumps import with_sampled_jumps
 from sloshlab.diagnosis.inference.scored_model import ScoredModel, scored
 from sloshlab.diagnosis.inference.whitened import WhitenedRun, whitened
-from sloshlab.diagnosis.selection.explained_scatter import ExplainedScatter
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
 from sloshlab.diagnosis.selection.known_fits import N_KEPT
 from sloshlab.diagnosis.selection.model_selection import ModelSelection
+from sloshlab.diagnosis.selection.noise_of_runs import NoiseOfRuns
 from sloshlab.diagnosis.surroundings import surroundings_of
 from sloshlab.errors import AnalysisError, InputError
 from sloshlab.identification.case import Case
@@ -145,13 +145,13 @@ def findings_of(
         runs = FittedRuns(model, fitting, case.names_by_test(), runs.effort)
         retuned_fit, _ = fitted(runs.problem(), retuned_fit.values, stages=INFLATION_STAGES[-1:])
     problem = runs.problem()
-    scatter = ExplainedScatter(model, fitting, held_out, case.names_by_test())
+    noise = NoiseOfRuns(model, fitting, held_out, case.names_by_test())
     at = surroundings_of(problem, retuned_fit, case.rig)
-    selection = ModelSelection(runs, at, progress, scatter)
+    selection = ModelSelection(runs, at, progress, noise)
     fits = selection.selected(retuned_fit)
     known, pool = selection.known, selection.growth.pool
     fitting, held_out = (
-        with_sampled_jumps(model, some, known.jumping) for some in (scatter.fitting, scatter.held_out)
+        with_sampled_jumps(model, some, known.jumping) for some in (noise.fitting, noise.held_out)
     )
     nothing = next(fit for fit in fits if not fit.candidates)
     with_effects = sorted((fit for fit in fits if fit.candidates), key=lambda fit: fit.cost)

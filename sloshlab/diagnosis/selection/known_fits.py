@@ -17,10 +17,10 @@ from sloshlab.diagnosis.inference.sampled_jumps import with_sampled_jumps
 from sloshlab.diagnosis.inference.scored_model import complexity, is_worth_a_word
 from sloshlab.diagnosis.inference.thresholds import LAW
 from sloshlab.diagnosis.inference.whitened import WhitenedRun, whitened
-from sloshlab.diagnosis.selection.explained_scatter import ExplainedScatter
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
 from sloshlab.diagnosis.selection.full_fit import at_its_optimum
 from sloshlab.diagnosis.selection.nested_models import keys_of
+from sloshlab.diagnosis.selection.noise_of_runs import NoiseOfRuns
 from sloshlab.diagnosis.selection.successive_halving import HOPELESS_COST_RATIO, NO_CHANCE
 from sloshlab.identification.free_run_fit import inflated_cost
 from sloshlab.identification.free_run_problem import TEMPERING, FreeRunFit
@@ -47,7 +47,7 @@ class KnownFits:
     Parameters
     ----------
     runs : FittedRuns
-    scatter : ExplainedScatter, optional
+    noise : NoiseOfRuns, optional
         Of these runs; without it their noise is what it is.
 
     Attributes
@@ -58,8 +58,8 @@ class KnownFits:
         Models that have no fit, and why; under `SEARCH` why it ended before its end.
     """
 
-    def __init__(self, runs: FittedRuns, scatter: ExplainedScatter | None = None) -> None:
-        self._scatter = scatter
+    def __init__(self, runs: FittedRuns, noise: NoiseOfRuns | None = None) -> None:
+        self._noise = noise
         self._quiet = self.runs = runs
         self._motions = DivergingMotions(runs.model, runs.tests)
         self._fits: dict[frozenset[str], FreeRunFit] = {}
@@ -269,7 +269,7 @@ class KnownFits:
         sound = [fit for fit in fits if not fit.trouble]
         if largest_evidence(sound) > largest_evidence([than]):
             return True
-        explaining = [fit for fit in sound if self._scatter is not None and self._scatter.may_explain(fit)]
+        explaining = [fit for fit in sound if self._noise is not None and self._noise.may_explain(fit)]
         if not explaining:
             return False
         return max(map(self._evidence_in_own_noise, explaining)) > self._evidence_in_own_noise(than)
@@ -296,11 +296,11 @@ class KnownFits:
         ----------
         best : FreeRunFit
         """
-        scatter, quiet, keys = self._scatter, self._quiet, keys_of(best.candidates)
-        if scatter is None or keys == self._explaining or not scatter.renew(best):
+        noise, quiet, keys = self._noise, self._quiet, keys_of(best.candidates)
+        if noise is None or keys == self._explaining or not noise.renew(best):
             return False
         self._explaining, self._driven_through = keys, frozenset()
-        self._quiet = FittedRuns(quiet.model, scatter.fitting, quiet.tests, quiet.effort)
+        self._quiet = FittedRuns(quiet.model, noise.fitting, quiet.tests, quiet.effort)
         self.renew_sampling()
         return True
 
@@ -311,13 +311,13 @@ class KnownFits:
         ----------
         best : FreeRunFit
         """
-        scatter, quiet, keys = self._scatter, self._quiet, keys_of(best.candidates)
-        if scatter is None or keys == self._driven_through:
+        noise, quiet, keys = self._noise, self._quiet, keys_of(best.candidates)
+        if noise is None or keys == self._driven_through:
             return False
         self._driven_through = keys
-        if not scatter.renew_drive(self._fits[frozenset()], best):
+        if not noise.renew_drive(self._fits[frozenset()], best):
             return False
-        self._quiet = FittedRuns(quiet.model, scatter.fitting, quiet.tests, quiet.effort)
+        self._quiet = FittedRuns(quiet.model, noise.fitting, quiet.tests, quiet.effort)
         self.renew_sampling()
         return True
 

@@ -15,13 +15,13 @@ from scipy.stats import norm, qmc
 
 from sloshlab.diagnosis.inference.posterior import log_prior
 from sloshlab.diagnosis.selection.equal_forces import equal_forces
-from sloshlab.diagnosis.selection.explained_scatter import ExplainedScatter
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns, values_of_runs
 from sloshlab.diagnosis.selection.forward_growth import ForwardGrowth, Said
 from sloshlab.diagnosis.selection.full_fit import at_its_optimum
 from sloshlab.diagnosis.selection.hidden_effects import hidden_effects
 from sloshlab.diagnosis.selection.known_fits import N_KEPT, KnownFits
 from sloshlab.diagnosis.selection.nested_models import keys_of, own_numbers, reduced, widened, without
+from sloshlab.diagnosis.selection.noise_of_runs import NoiseOfRuns
 from sloshlab.diagnosis.selection.successive_halving import STEPS_OF_A_RUNG
 from sloshlab.identification.baseline_parameter import prior_cost
 from sloshlab.identification.free_run_fit import INFLATION_STAGES, fitted
@@ -43,7 +43,7 @@ class ModelSelection:
     at : Surroundings
     said : callable
         Told what is being done, how much of it is done, and how much there is.
-    scatter : ExplainedScatter, optional
+    noise : NoiseOfRuns, optional
         Of these runs; without it their noise is what it is.
 
     Attributes
@@ -52,10 +52,8 @@ class ModelSelection:
     growth : ForwardGrowth
     """
 
-    def __init__(
-        self, runs: FittedRuns, at: Surroundings, said: Said, scatter: ExplainedScatter | None = None
-    ) -> None:
-        self.said, self.known = said, KnownFits(runs, scatter)
+    def __init__(self, runs: FittedRuns, at: Surroundings, said: Said, noise: NoiseOfRuns | None = None) -> None:
+        self.said, self.known = said, KnownFits(runs, noise)
         self.growth = ForwardGrowth(self.known, at, said)
         self._swapped_beside: dict[frozenset[str], set[frozenset[str]]] = {}
         self._simplified_at: dict[tuple[frozenset[str], str], Mapping[str, float]] = {}

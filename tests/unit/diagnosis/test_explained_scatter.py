@@ -10,9 +10,9 @@ import pytest
 from recorded_oscillators import RATE_HZ, decays, effect, rig, surroundings
 from test_external_force import FORCE_N, PERIOD_S, WIDTH_S, pulses
 
-from sloshlab.diagnosis.selection.explained_scatter import ExplainedScatter
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
 from sloshlab.diagnosis.selection.known_fits import KnownFits, largest_evidence
+from sloshlab.diagnosis.selection.noise_of_runs import NoiseOfRuns
 from sloshlab.identification.free_run_fit import fitted, fitted_baseline
 from sloshlab.identification.free_run_problem import HUBER_LIMIT, TEMPERING, FreeRunFit
 from sloshlab.identification.observations import Observation, observations, with_scatter, with_typical_scatter
@@ -69,7 +69,7 @@ def scattered(model: RigModel) -> list[list[Observation]]:
 
 def test_what_scatters_about_a_model_of_the_pulses_is_the_noise_of_the_sensors(model: RigModel) -> None:
     runs = scattered(model)
-    scatter = ExplainedScatter(model, runs[:1], runs[1:], [list(STARTS_S)])
+    scatter = NoiseOfRuns(model, runs[:1], runs[1:], [list(STARTS_S)])
     assert not scatter.renew(fit_of(model, with_pulses=False))
     assert scatter.fitting[0][0] is runs[0][0]
     assert scatter.renew(fit_of(model, with_pulses=True))
@@ -90,7 +90,7 @@ def test_pulses_are_more_probable_where_each_model_has_its_own_noise(tmp_path: P
     model = recorded(tmp_path, has_pulses=are_there)
     runs, tests = scattered(model), [list(STARTS_S)]
     # repeats that are held out have no part in it
-    known = KnownFits(FittedRuns(model, runs[:1], tests), ExplainedScatter(model, runs[:1], runs[1:], tests))
+    known = KnownFits(FittedRuns(model, runs[:1], tests), NoiseOfRuns(model, runs[:1], runs[1:], tests))
     at_truth = fit_of(model, with_pulses=True)
     own = {name: value for name, value in at_truth.values.items() if not name.endswith("in second")}
     pulses, _ = fitted(known.runs.problem_of(at_truth), own)
@@ -131,10 +131,10 @@ def test_a_run_that_was_not_repeated_scatters_as_the_repeats_do(model: RigModel)
     alone = with_typical_scatter(
         observations(replace(other, name="alone"), [each.channel for each in runs[0]]), [*runs[0], *runs[1]]
     )
-    scatter = ExplainedScatter(model, [*runs, alone], [], [list(STARTS_S), ["alone"]])
+    scatter = NoiseOfRuns(model, [*runs, alone], [], [list(STARTS_S), ["alone"]])
     assert scatter.renew(fit_of(model, with_pulses=True))
     before, after = (float(each[0].variance[2:-2, :12].mean()) for each in (alone, scatter.fitting[2]))
     assert before > 5.0 * after
-    single = ExplainedScatter(model, [runs[0]], [], [["first"], ["second"]])
+    single = NoiseOfRuns(model, [runs[0]], [], [["first"], ["second"]])
     assert single.renew(fit_of(model, with_pulses=True))
     assert all(new is old for new, old in zip(single.fitting[0], runs[0], strict=True))
