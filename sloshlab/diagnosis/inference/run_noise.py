@@ -11,7 +11,7 @@ residuals are whitened by the inverse of its Cholesky root, and so is the transf
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -26,6 +26,7 @@ from sloshlab.identification.observations import Observation
 from sloshlab.identification.rig_model import RigModel
 
 FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
 _CELL: Final = (4, 4)
 """Blocks and bands, two seconds and four hertz, within which powers and correlations are constant."""
 _EXACT_BESIDE_CHAOS: Final = 0.05
@@ -79,10 +80,10 @@ def run_noise(model: DiagnosedModel, observed: Sequence[Observation], values: Ma
     n = len(observed)
     noise = np.sqrt(np.stack([each.variance for each in observed], axis=-1))
     places = {}
-    transfers_at = transfers_of(model, observed, values)
+    transfers_at, spread = _transfers_over_bands(model, observed, values)
+    scales = np.median(noise, axis=0)
     for place, transfers in transfers_at.items():
-        # Real and imaginary part as two directions: the transform is real, and its phase runs.
-        parts = np.stack([transfers.real, transfers.imag], axis=-1)
+        parts = spread(transfers, scales)
         if parts.any():
             places[place] = _projections(inverse_root @ (parts[None] / noise[..., None]))
     if not isinstance(model, RigModel | ModelOfBlocks) and (n > 1 or STRUCTURE not in places):
@@ -98,6 +99,47 @@ def run_noise(model: DiagnosedModel, observed: Sequence[Observation], values: Ma
         steady = {f"{SENSOR} {each.channel}" for each, moved in zip(observed, is_moved, strict=True) if not moved}
     exactness = {place: EXACT if place in steady else _EXACT_BESIDE_CHAOS for place in places}
     return RunNoise(inverse_root, places, exactness)
+
+
+_PLACES_IN_A_BAND: Final = 32
+"""Frequencies of a transfer: the half-width of a resonance is a tenth of a band."""
+_REACH: Final = 2
+"""Bands to either side of which a coefficient has power: the main lobe of its window, and its first side lobes."""
+_N_DIRECTIONS: Final = 4
+"""Of a transfer over a band: its value and its slope, real and imaginary."""
+
+
+def _transfers_over_bands(
+    model: DiagnosedModel, observed: Sequence[Observation], values: Mapping[str, float]
+) -> tuple[dict[str, ComplexArray], Callable[[ComplexArray, FloatArray], FloatArray]]:
+    """Transfers of the places, and what makes directions of them, shape (n_bands, n_channels, m).
+
+    A force has power at all frequencies of a band, and where a resonance is beside it shows as the resonance does:
+    a coefficient has the covariance ∫ |W(f − f_k)|² Re(g gᴴ) df with the spectrum W of its window, a half sine
+    of two bands, W(δ) = cos(πδ)/(1 − 4δ²) with δ in bands.
+    """
+    if not isinstance(model, RigModel | ModelOfBlocks):
+        # Real and imaginary part as two directions: the transform is real, and its phase runs.
+        return transfers_of(model, observed, values), lambda g, _: np.stack([g.real, g.imag], axis=-1)
+    bands_hz = observed[0].frequencies_hz
+    width_hz = bands_hz[1] - bands_hz[0]
+    n = _PLACES_IN_A_BAND
+    fine_hz = bands_hz[0] + width_hz * (np.arange(-_REACH * n, (bands_hz.size - 1 + _REACH) * n + 1) / n)
+    offsets = np.arange(-_REACH * n, _REACH * n + 1) / n
+    window = (np.cos(np.pi * offsets) / np.where(np.abs(offsets) == 0.5, np.inf, 1 - 4 * offsets**2)) ** 2
+    window[np.abs(offsets) == 0.5] = (np.pi / 4) ** 2
+
+    def spread(transfers: ComplexArray, scales: FloatArray) -> FloatArray:
+        powers = np.einsum("fc,fd->fcd", transfers, transfers.conj()).real
+        within = np.lib.stride_tricks.sliding_window_view(powers, window.size, axis=0)[::n]
+        covariance = within @ (window / window.sum()) / (scales[:, :, None] * scales[:, None, :])
+        found, vectors = np.linalg.eigh(covariance)
+        largest = slice(-min(_N_DIRECTIONS, found.shape[1]), None)
+        sizes = np.sqrt(np.maximum(found[:, largest], 0.0))
+        return np.asarray(vectors[:, :, largest] * sizes[:, None, :] * scales[:, :, None])
+
+    # none at and below zero frequency
+    return transfers_of(model, observed, values, np.maximum(fine_hz, 1e-3 * width_hz)), spread
 
 
 def _covariance(observed: Sequence[Observation]) -> FloatArray:

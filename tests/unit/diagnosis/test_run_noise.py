@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
-from recorded_oscillators import RATE_HZ, rig, run_of
+from recorded_oscillators import DAMPING, MASS_KG, RATE_HZ, STIFFNESS, rig, run_of
+from scipy.signal import StateSpace, lsim
 
 from sloshlab.diagnosis.inference.run_noise import run_noise, sums_of_cells
 from sloshlab.errors import AnalysisError
+from sloshlab.identification.observations import observations
 from sloshlab.identification.rig_model import RigModel
 
 SHAPE = (8, 12)
@@ -104,6 +107,34 @@ def test_what_the_tank_does_not_move_knows_no_chaos_of_its_liquid(tmp_path: Path
     assert exact["sensor acceleration_root"] == 0.01
     for place in ("tank", "structure", "sensor acceleration_tip", "sensor force_interface"):
         assert exact[place] == (0.05 if damping else 0.01)
+
+
+def test_a_force_shows_beside_a_resonance_as_the_resonance_does(tmp_path: Path) -> None:
+    """White force on an oscillator of 6.56 Hz, by SciPy: displacement and acceleration have the ratio 1/ω₀² in the
+    bands of 5.5 and 7.6 Hz, too, as there is more of what a window lets through of the resonance.
+    """
+    generator, n = np.random.default_rng(6), round(1200 * RATE_HZ)
+    force = generator.normal(size=n)
+    system = StateSpace(
+        [[0.0, 1.0], [-STIFFNESS / MASS_KG, -DAMPING / MASS_KG]],
+        [[0.0], [1.0 / MASS_KG]],
+        [[1.0, 0.0], [-STIFFNESS / MASS_KG, -DAMPING / MASS_KG]],
+        [[0.0], [1.0 / MASS_KG]],
+    )
+    _, y, _ = lsim(system, force, np.arange(n) / RATE_HZ, interp=False)
+    channels = {"displacement_tank": y[:, 0], "acceleration_tip": y[:, 1]}
+    run = run_of("pushed", channels, {}, 1, initial_displacement_m=1e-3)
+    model = RigModel(rig(tmp_path), tmp_path, [run])
+    found = [
+        replace(each, variance=np.full(each.spectra.shape, float(np.mean(each.spectra**2))))
+        for each in observations(run, list(channels))
+    ]
+    rows, shares = run_noise(model, found, model.believed).places["structure"]
+    expected = np.einsum("bkm,bkmc,bkmd->kcd", shares, rows, rows) / rows.shape[0]
+    x = np.stack([each.spectra / np.sqrt(each.variance) for each in found])[:, 4:-4]
+    for band in (4, 5, 6, 7, 8):
+        covariance = x[:, :, band] @ x[:, :, band].T
+        np.testing.assert_allclose(expected[band], covariance / np.trace(covariance), atol=0.03)
 
 
 def test_cells_at_the_ends_are_smaller() -> None:
