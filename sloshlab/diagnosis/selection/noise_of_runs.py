@@ -11,6 +11,7 @@ from sloshlab.identification.diagnosed_model import DiagnosedModel
 from sloshlab.identification.free_run_problem import FreeRunFit
 from sloshlab.identification.noise_floor import with_noise_through
 from sloshlab.identification.observations import Observation
+from sloshlab.missing_physics.candidate import extension_of
 
 
 class NoiseOfRuns:
@@ -67,7 +68,10 @@ class NoiseOfRuns:
         return True
 
     def renew_drive(self, before: FreeRunFit, fit: FreeRunFit) -> bool:
-        """Take what the noise of drives makes beside a fit from here on; whether it is more than before.
+        """Take what the noise of drives makes beside a fit from here on; whether it is another than before.
+
+        Contacts and dry friction magnify it until motions part: what they leave then is no noise
+        (`DivergingMotions`).
 
         Parameters
         ----------
@@ -76,7 +80,10 @@ class NoiseOfRuns:
         fit : FreeRunFit
         """
         known = [each for run in (*self.fitting, *self.held_out) for each in run]
-        every = with_noise_through(self._model, self._of_scatter, self._tests, before, fit)
+        extension = extension_of(fit.candidates, fit.values)
+        every = self._of_scatter
+        if not any(term.jumps for run in every for term in extension.terms_in(run[0].run.name)):
+            every = with_noise_through(self._model, every, self._tests, before, fit)
         self._take(every)
         return any(new is not old for new, old in zip((each for run in every for each in run), known, strict=True))
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recorded_oscillators import RATE_HZ, decays, effect, rig, surroundings
+from recorded_oscillators import RATE_HZ, decays, driven, effect, rig, surroundings
 from test_external_force import FORCE_N, PERIOD_S, WIDTH_S, pulses
 
 from sloshlab.diagnosis.selection.fitted_runs import FittedRuns
@@ -138,3 +138,24 @@ def test_a_run_that_was_not_repeated_scatters_as_the_repeats_do(model: RigModel)
     single = NoiseOfRuns(model, [runs[0]], [], [["first"], ["second"]])
     assert single.renew(fit_of(model, with_pulses=True))
     assert all(new is old for new, old in zip(single.fitting[0], runs[0], strict=True))
+
+
+@pytest.mark.parametrize(
+    ("name", "number", "is_more"), [("quadratic_drag", 30.0, True), ("coulomb_friction", 2.0, False)]
+)
+def test_what_drives_make_beside_friction_is_no_noise(
+    tmp_path: Path, name: str, number: float, is_more: bool
+) -> None:
+    """Friction magnifies differences until motions part; what a drag makes of a noisy base is noise."""
+    model = RigModel(rig(tmp_path), tmp_path, driven(noise={"acceleration_root": 0.2, "acceleration_tip": 1e-4}))
+    observed = [observations(run, model.compared(run), model.driving(run)) for run in model.runs]
+    noise = NoiseOfRuns(model, observed, [], [[run.name] for run in model.runs])
+    known = effect(f"structure.{name}")
+    added = Candidate(known, surroundings(model))
+    before = FreeRunFit((), dict(model.believed), 0.0, 0.0)
+    values = {**model.believed, f"{added.key}.{known.parameters[0].name}": number}
+    assert noise.renew_drive(before, FreeRunFit((added,), values, 0.0, 0.0)) is is_more
+    assert (noise.fitting[0][0] is not observed[0][0]) is is_more
+    if is_more:
+        assert noise.renew_drive(before, before)
+        assert noise.fitting[0][0] is observed[0][0]
