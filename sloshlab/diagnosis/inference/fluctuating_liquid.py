@@ -17,13 +17,12 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
-from sloshlab.diagnosis.inference.places import TANK, transfers_of
+from sloshlab.diagnosis.inference.places import PLACES_IN_A_BAND, TANK, transfers_of
 from sloshlab.errors import SloshlabError
 from sloshlab.identification.diagnosed_model import DiagnosedModel, Request
 from sloshlab.identification.free_run_problem import FreeRunFit
@@ -33,8 +32,6 @@ from sloshlab.identification.rig_parameters import TOLERANCE_OF_FLUCTUATION, dam
 from sloshlab.missing_physics.candidate import extension_of
 
 FloatArray = NDArray[np.float64]
-_PLACES_IN_A_BAND: Final = 32
-"""Frequencies at which a transfer is averaged: the half-width of a resonance is a tenth of a band."""
 
 
 def with_fluctuation(
@@ -104,7 +101,7 @@ def _powers(model: RigModel, run: Sequence[Observation], fit: FreeRunFit) -> lis
 def _mean_gains(model: RigModel, run: Sequence[Observation], fit: FreeRunFit) -> FloatArray:
     """Squared readings per force at the tank, shape (n_bands, n_channels); resonances are narrower than bands."""
     bands_hz = run[0].frequencies_hz
-    within = (np.arange(_PLACES_IN_A_BAND) + 0.5) / _PLACES_IN_A_BAND - 0.5
+    within = (np.arange(PLACES_IN_A_BAND) + 0.5) / PLACES_IN_A_BAND - 0.5
     at_hz = bands_hz[:, None] + within * (bands_hz[1] - bands_hz[0])
     gains = np.abs(transfers_of(model, run, fit.values, at_hz.ravel())[TANK]) ** 2
     return np.asarray(gains.reshape(*at_hz.shape, len(run)).mean(axis=1))

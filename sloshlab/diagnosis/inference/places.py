@@ -24,6 +24,8 @@ SENSOR: Final = "sensor"
 ELSEWHERE: Final = "structure elsewhere"
 """Of a user's own twin, which says of one coordinate alone how a force on it shows."""
 STRUCTURE, TANK = "structure", "tank"
+PLACES_IN_A_BAND: Final = 32
+"""Frequencies at which a transfer is averaged: the half-width of a resonance is a tenth of a band."""
 
 
 def block_of(place: str) -> str:

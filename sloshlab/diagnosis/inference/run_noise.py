@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from sloshlab.diagnosis.inference.places import ELSEWHERE, SENSOR, STRUCTURE, TANK, transfers_of
+from sloshlab.diagnosis.inference.places import ELSEWHERE, PLACES_IN_A_BAND, SENSOR, STRUCTURE, TANK, transfers_of
 from sloshlab.identification.diagnosed_model import EXACT, DiagnosedModel, ModelOfBlocks
 from sloshlab.identification.noise_floor import N_BLOCKS
 from sloshlab.identification.observations import Observation
@@ -27,6 +27,10 @@ from sloshlab.identification.rig_model import RigModel
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
+_REACH: Final = 2
+"""Bands to either side of which a coefficient has power: the main lobe of its window, and its first side lobes."""
+_N_DIRECTIONS: Final = 4
+"""Of a transfer over a band: its value and its slope, real and imaginary."""
 _CELL: Final = (4, 4)
 """Blocks and bands, two seconds and four hertz, within which powers and correlations are constant."""
 _EXACT_BESIDE_CHAOS: Final = 0.05
@@ -101,14 +105,6 @@ def run_noise(model: DiagnosedModel, observed: Sequence[Observation], values: Ma
     return RunNoise(inverse_root, places, exactness)
 
 
-_PLACES_IN_A_BAND: Final = 32
-"""Frequencies of a transfer: the half-width of a resonance is a tenth of a band."""
-_REACH: Final = 2
-"""Bands to either side of which a coefficient has power: the main lobe of its window, and its first side lobes."""
-_N_DIRECTIONS: Final = 4
-"""Of a transfer over a band: its value and its slope, real and imaginary."""
-
-
 def _transfers_over_bands(
     model: DiagnosedModel, observed: Sequence[Observation], values: Mapping[str, float]
 ) -> tuple[dict[str, ComplexArray], Callable[[ComplexArray, FloatArray], FloatArray]]:
@@ -116,18 +112,17 @@ def _transfers_over_bands(
 
     A force has power at all frequencies of a band, and where a resonance is beside it shows as the resonance does:
     a coefficient has the covariance ∫ |W(f − f_k)|² Re(g gᴴ) df with the spectrum W of its window, a half sine
-    of two bands, W(δ) = cos(πδ)/(1 − 4δ²) with δ in bands.
+    of two bands, W(δ) ∝ cos(πδ)/(1 − 4δ²) with δ in bands.
     """
     if not isinstance(model, RigModel | ModelOfBlocks):
         # Real and imaginary part as two directions: the transform is real, and its phase runs.
         return transfers_of(model, observed, values), lambda g, _: np.stack([g.real, g.imag], axis=-1)
     bands_hz = observed[0].frequencies_hz
     width_hz = bands_hz[1] - bands_hz[0]
-    n = _PLACES_IN_A_BAND
+    n = PLACES_IN_A_BAND
     fine_hz = bands_hz[0] + width_hz * (np.arange(-_REACH * n, (bands_hz.size - 1 + _REACH) * n + 1) / n)
     offsets = np.arange(-_REACH * n, _REACH * n + 1) / n
-    window = (np.cos(np.pi * offsets) / np.where(np.abs(offsets) == 0.5, np.inf, 1 - 4 * offsets**2)) ** 2
-    window[np.abs(offsets) == 0.5] = (np.pi / 4) ** 2
+    window = (np.sinc(offsets - 0.5) + np.sinc(offsets + 0.5)) ** 2
 
     def spread(transfers: ComplexArray, scales: FloatArray) -> FloatArray:
         powers = np.einsum("fc,fd->fcd", transfers, transfers.conj()).real
